@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "calibration/map/map_errors.h"
+#include "evaluation/floor_limits.h"
 #include "evaluation/limits_table.h"
 #include "geometry/angles.h"
-#include "positioning/floor_limits.h"
 #include "program/app.h"
 #include "program/steps/capture_options.h"
 #include "program/steps/print_fixes.h"
@@ -82,10 +82,10 @@ BodyPrior make_body_prior(const Options& options, const Camera& camera) {
   BodyPrior prior;
   if (const auto motion = options.motion.make_motion_prior()) {
     check_row_time_and_readout_known(camera);
-    prior.velocity_sd_m_per_s = motion->velocity_sd_m_per_s;
-    prior.yaw_rate_sd_rad_per_s = motion->yaw_rate_sd_rad_per_s;
+    prior.set_sd(kBodyVelocity, motion->velocity_sd_m_per_s);
+    prior.set_sd(kBodyYawRate, motion->yaw_rate_sd_rad_per_s);
   }
-  prior.inclination_sd_rad = rad_from_deg(options.roll_pitch_sd_deg);
+  prior.set_sd(kBodyRoll, rad_from_deg(options.roll_pitch_sd_deg));
   return prior;
 }
 

@@ -7,7 +7,7 @@
 
 #include "captures/csv_writer.h"
 #include "captures/number_text.h"
-#include "positioning/floor_limits.h"
+#include "evaluation/floor_limits.h"
 
 namespace vlp {
 

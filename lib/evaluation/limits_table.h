@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "positioning/floor_limits.h"
+#include "evaluation/floor_limits.h"
 
 namespace vlp {
 

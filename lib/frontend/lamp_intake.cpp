@@ -317,19 +317,6 @@ LampIntake::LampIntake(const LampImages& images, ImageUse use, const FrontendOpt
   if (!options.annotate.empty()) create_annotate_folder(options.annotate, images.images);
 }
 
-LampIntake LampIntake::copy_intake_with_level_rotations(const LevelRotations& levels) const {
-  LampIntake other = *this;
-  other.use_ = ImageUse::fixes;
-  for (const auto& [image, level] : levels) other.levels_.insert_or_assign(image, level);
-  return other;
-}
-
-LampIntake LampIntake::copy_intake_with_annotation_folder(const fs::path& folder) const {
-  LampIntake other = *this;
-  other.options_.annotate = folder;
-  return other;
-}
-
 Observation LampIntake::detect_lamps_in_image(const SourceImage& source) const {
   Observation result{source.file, source.time_s};
   result.readout = detector_.readout_direction();
@@ -348,6 +335,13 @@ Observation LampIntake::detect_lamps_in_image(const SourceImage& source) const {
       result.lights = std::move(lights);
     } else {
       result.lights = detector.detect_lights(to_image_view(image));
+    }
+    if (repetition_) {
+      result.lights = repetition_(result.image_file_name(), std::move(result.lights),
+                                  [&](const std::optional<Eigen::Matrix3d>& level_from_camera) {
+                                    return detector.copy_detector_for_camera_tilt(level_from_camera)
+                                        .detect_lights(to_image_view(image));
+                                  });
     }
     if (std::cmp_less(collect_identified_lamps(result).size(), min_lamps_for_image_use(use_)))
       reject_image_with_few_lamps(image, result);

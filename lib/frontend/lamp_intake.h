@@ -5,10 +5,12 @@
 #include <Eigen/Core>
 #include <array>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "captures/captures_table.h"
@@ -40,6 +42,14 @@ Eigen::Matrix3d compute_level_rotation_from_inclination(const Inclination& incli
 LevelRotations compute_level_rotations_of_images(const CapturesTable& captures,
                                                  const Calibration& calibration,
                                                  double yaw_in_robot_rad);
+
+/// Function that detects the lights of an image in the plane that is level by a rotation;
+/// std::nullopt: by ellipses in the image.
+using LightsInPlane = std::function<std::vector<Light>(const std::optional<Eigen::Matrix3d>&)>;
+/// Function that replaces the lights of the named image by those of a repeated detection, as in the
+/// level plane of its fix. Threads call it.
+using DetectionRepetition = std::function<std::vector<Light>(
+    const std::string& image, std::vector<Light> lights, const LightsInPlane& detect)>;
 
 /// Images of lamps with the lamp map and the camera.
 struct LampImages {
@@ -81,11 +91,8 @@ class LampIntake {
   /// @throws InputError if an annotated image cannot be written
   Observation detect_lamps_in_image(const SourceImage& source) const;
 
-  /// Returns an intake that repeats a detection with other level rotations for some images. It
-  /// rejects no image for its content.
-  LampIntake copy_intake_with_level_rotations(const LevelRotations& levels) const;
-  /// Returns the same intake with annotated images in `folder`; without them if it is empty.
-  LampIntake copy_intake_with_annotation_folder(const std::filesystem::path& folder) const;
+  /// Applies `repetition` to the lights of each image.
+  void set_repetition(DetectionRepetition repetition) { repetition_ = std::move(repetition); }
 
   /// Applies detect_lamps_in_image() to all images and video frames. Returns one observation per
   /// image, in order.
@@ -102,6 +109,7 @@ class LampIntake {
   ImageUse use_;
   FrontendOptions options_;
   std::optional<std::array<int, 2>> imager_px_;
+  DetectionRepetition repetition_;
   /// True if an image may be read out in the other direction
   /// (detect_lights_with_unknown_readout()).
   bool can_turn_ = false;

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/observation.h"
+#include "lamps/light_detector.h"
 
 #include <fmt/core.h>
 
@@ -69,11 +70,7 @@ void prepend_observation_messages(const Observations& remarks, Observations& res
 }
 
 std::vector<Detection> collect_identified_lamps(const Observation& image) {
-  std::vector<Detection> lamps;
-  for (const Light& light : image.lights) {
-    if (light.kind == LightKind::lamp) lamps.push_back({*light.lamp, light.pixel, light.sigma_px});
-  }
-  return lamps;
+  return select_lamps(image.lights);
 }
 
 std::vector<BoardView> collect_board_views_of_kept_images(std::span<const Observation> images) {

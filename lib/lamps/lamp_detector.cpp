@@ -52,12 +52,14 @@ LampDetector::LampDetector(const LampMap& lamps, const Calibration& calibration)
 
 std::vector<Detection> LampDetector::detect_lamps(const ImageView& image) const {
   check(image, size_);
-  std::vector<Detection> detections;
-  for (const Light& light : detector_->detect_lights(image)) {
-    if (light.kind != LightKind::lamp) continue;
-    detections.push_back({*light.lamp, light.pixel, light.sigma_px});
-  }
-  return detections;
+  return select_lamps(detector_->detect_lights(image));
+}
+
+std::vector<Detection> LampDetector::detect_lamps(
+    const ImageView& image, const std::optional<Eigen::Matrix3d>& level_from_camera) const {
+  check(image, size_);
+  return select_lamps(
+      detector_->copy_detector_for_camera_tilt(level_from_camera).detect_lights(image));
 }
 
 }  // namespace vlp

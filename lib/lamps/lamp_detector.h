@@ -2,7 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "../rig/calibration.h"
@@ -37,6 +39,11 @@ class LampDetector {
   /// @throws std::invalid_argument if `image` has no pixels, another size, another bit depth, rows
   ///        that overlap, or 16-bit pixels at odd addresses
   std::vector<Detection> detect_lamps(const ImageView& image) const;
+  /// The same for a camera with another tilt, of which lamps are discs in the plane that is level
+  /// by the rotation level_from_camera. std::nullopt: unknown, for which ellipses are fitted in the
+  /// image.
+  std::vector<Detection> detect_lamps(
+      const ImageView& image, const std::optional<Eigen::Matrix3d>& level_from_camera) const;
 
  private:
   std::shared_ptr<const LightDetector> detector_;

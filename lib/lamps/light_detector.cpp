@@ -208,6 +208,14 @@ std::vector<PixelBox> merge_overlapping_boxes(std::vector<PixelBox> boxes) {
 
 }  // namespace
 
+std::vector<Detection> select_lamps(std::span<const Light> lights) {
+  std::vector<Detection> lamps;
+  for (const Light& light : lights) {
+    if (light.kind == LightKind::lamp) lamps.push_back({*light.lamp, light.pixel, light.sigma_px});
+  }
+  return lamps;
+}
+
 DetectorCamera make_detector_camera(const Calibration& calibration) {
   const Camera& camera = calibration.camera;
   DetectorCamera result{camera.readout.value_or(Readout::rows), camera.row_time_s,

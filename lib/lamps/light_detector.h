@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <map>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "lamps/image/image_view.h"
@@ -17,12 +18,16 @@
 #include "lamps/signal/lamp_classifier.h"
 #include "lamps/signal/modulated_lights.h"
 #include "rig/calibration.h"
+#include "rig/detection.h"
 #include "rig/lamp_map.h"
 
 namespace vlp {
 
 /// Returns true if the image border cuts no part of the light.
 bool is_light_fully_in_view(const Light& light, const ImageSize& size);
+
+/// Returns the detections of the lights that are lamps.
+std::vector<Detection> select_lamps(std::span<const Light> lights);
 
 /// Returns the camera parameters of a calibration for a detector: row time, lens, readout direction
 /// (rows if unknown). level_from_camera is the calibrated tilt (level_rotation_from_zenith());

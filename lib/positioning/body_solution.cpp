@@ -7,10 +7,10 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <span>
 
 #include "geometry/angles.h"
 #include "geometry/symmetric.h"
-#include "positioning/closed_form.h"
 #include "positioning/three_lamp_poses.h"
 
 namespace vlp {
@@ -21,7 +21,7 @@ BodyState make_body_state_from_camera_pose(const FreePose& camera, const BodyPro
   const Eigen::Matrix3d world_from_body = camera.camera_from_world.transpose();
   BodyState state{{camera.position_m - world_from_body * problem.arm_m,
                    std::atan2(world_from_body(1, 0), world_from_body(0, 0))},
-                  problem.prior.mean};
+                  problem.prior.mean.motion};
   state.motion.inclination = {std::atan2(world_from_body(2, 1), world_from_body(2, 2)),
                               -std::asin(std::clamp(world_from_body(2, 0), -1.0, 1.0))};
   return state;
@@ -50,7 +50,7 @@ bool has_fix(const BodySolution& solution) {
 
 bool is_roll_pitch_unknown(const BodyPrior& prior) {
   constexpr double max_known_sd_rad = 0.15;
-  return prior.inclination_sd_rad > max_known_sd_rad;
+  return prior.max_variance(kBodyRoll, 2) > max_known_sd_rad * max_known_sd_rad;
 }
 
 LevelSightings::LevelSightings(const FrameObservations& frame,
@@ -65,7 +65,7 @@ LevelSightings::LevelSightings(const FrameObservations& frame,
 
 BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem& problem,
                                            const Eigen::Matrix3d& lean) {
-  BodyState state{camera, problem.prior.mean};
+  BodyState state{camera, problem.prior.mean.motion};
   state.pose.position_m -= rotation_about_z(camera.yaw_rad) * lean * problem.arm_m;
   return state;
 }
@@ -104,15 +104,15 @@ namespace {
 
 InitialStates compute_level_states(const FrameObservations& frame, const BodyProblem& problem) {
   const BodyPrior& prior = problem.prior;
-  const Eigen::Matrix3d lean = level_rotation_from_inclination(prior.mean.inclination);
+  const Eigen::Matrix3d lean = level_rotation_from_inclination(prior.mean.motion.inclination);
   const LevelSightings level(frame, lean);
   InitialLevelPoses start{FixStatus::lamp_below_camera};
   if (level.are_lamps_above_horizon && level.size > 1) {
     start = compute_initial_poses(level.observations_span());
-  } else if (level.are_lamps_above_horizon && prior.height && prior.yaw) {
+  } else if (level.are_lamps_above_horizon && std::isfinite(prior.max_variance(kBodyZ, 2))) {
     const double arm_z_m = (lean * (problem.arm_m - prior.height_point_m)).z();
     const auto pose = compute_pose_at_known_height_and_yaw(
-        level.sightings.front(), prior.height->z_m + arm_z_m, prior.yaw->yaw_rad);
+        level.sightings.front(), prior.mean.pose.position_m.z() + arm_z_m, prior.mean.pose.yaw_rad);
     if (pose) start = {FixStatus::ok, 1, {*pose}};
   }
   InitialStates states{start.status, start.count, {}};
@@ -171,15 +171,38 @@ bool is_beyond_linear_range(const BodyState& state, double chi_squared, const Bo
          max_ratio * (chi_squared - fix.chi_squared) + max_excess;
 }
 
+/// A state that explains the frame; infinite if there is none.
+struct Explanation {
+  BodyState state;
+  double chi_squared = std::numeric_limits<double>::infinity();
+};
+using Explanations = std::array<Explanation, 6>;
+
+/// Sets the states that are nearly as likely as the best one as candidates. `scale` is the ratio of
+/// chi-squared to its expectation.
+void set_candidates(Explanations& found, double scale, BodySolution& solution) {
+  constexpr double unlikely = 12;
+  std::ranges::sort(found, {}, &Explanation::chi_squared);
+  double sum = 0;
+  for (const auto& [state, chi_squared] : found) {
+    const double excess = (chi_squared - found.front().chi_squared) / scale;
+    if (!(excess < unlikely)) break;
+    solution.candidates[static_cast<std::size_t>(solution.num_candidates++)] = {
+        state, std::exp(-excess / 2)};
+    sum += std::exp(-excess / 2);
+  }
+  for (FixCandidate& candidate : solution.candidates) candidate.likelihood /= sum;
+}
+
 /// Returns the fix with the smallest chi-squared from several initial states; `ambiguous` if
-/// another fix explains the frame nearly as well.
+/// another state explains the frame nearly as well.
 BodySolution find_best_body_solution(const InitialStates& initial_states,
                                      const FrameObservations& frame, const BodyProblem& problem) {
-  constexpr double hopeless = 100, small = 100, unlikely = 12, same_m = 1e-4;
+  constexpr double hopeless = 100, small = 100, same_m = 1e-4;
   std::array<double, 6> at_start;
   at_start.fill(std::numeric_limits<double>::infinity());
   // Three lamps with unknown roll and pitch: pixels and states are equal in number.
-  const bool is_exact = frame.size == 3 && problem.prior.inclination_sd_rad > 0;
+  const bool is_exact = frame.size == 3 && problem.prior.is_tilt_estimated();
   const bool is_single = initial_states.count == 1 && !is_exact;
   if (is_single) at_start[0] = 0;
   for (std::size_t i = 0; !is_single && static_cast<int>(i) < initial_states.count; ++i) {
@@ -189,37 +212,37 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
   }
   const double min_chi_squared = *std::min_element(at_start.begin(), at_start.end());
   std::optional<BodyFix> best;
-  double second = std::numeric_limits<double>::infinity();
+  Explanations found;
   for (std::size_t i = 0; static_cast<int>(i) < initial_states.count; ++i) {
+    const BodyState& start = initial_states.states[i];
     if (!(at_start[i] <= hopeless * (min_chi_squared + small))) continue;
-    const auto fix =
-        estimate_body_state(frame.observations_span(), problem, initial_states.states[i]);
+    const auto fix = estimate_body_state(frame.observations_span(), problem, start);
     // Such a state that does not converge is close to two solutions.
-    if (!fix && is_exact)
-      second = std::min(second, compute_prior_chi_squared(initial_states.states[i], problem));
+    if (!fix && is_exact) found[i] = {start, compute_prior_chi_squared(start, problem)};
     if (!fix || !are_below_lamps(frame, problem, fix->state)) continue;
-    if (!best) {
-      best = fix;
-      continue;
-    }
-    const bool same = (fix->state.pose.position_m - best->state.pose.position_m).norm() < same_m;
-    if (same) continue;
-    second = std::min(second, std::max(fix->chi_squared, best->chi_squared));
-    if (fix->chi_squared < best->chi_squared) best = fix;
+    const bool is_known = std::ranges::any_of(std::span(found).first(i), [&](const auto& other) {
+      return std::isfinite(other.chi_squared) &&
+             (fix->state.pose.position_m - other.state.pose.position_m).norm() < same_m;
+    });
+    if (!is_known) found[i] = {fix->state, fix->chi_squared};
+    if (!best || (!is_known && fix->chi_squared < best->chi_squared)) best = fix;
   }
-  if (!best) return {FixStatus::degenerate, {}};
+  if (!best) return {FixStatus::degenerate};
   if (!is_body_position_determined(frame, problem.prior, *best)) {
     const bool is_pose_alone = !problem.prior.is_motion_or_tilt_estimated();
     return {is_pose_alone ? FixStatus::degenerate : FixStatus::undetermined, *best};
   }
   for (std::size_t i = 0; is_exact && static_cast<int>(i) < initial_states.count; ++i) {
-    if (is_beyond_linear_range(initial_states.states[i], at_start[i], *best))
-      second = std::min(second, at_start[i]);
+    if (std::isinf(found[i].chi_squared) &&
+        is_beyond_linear_range(initial_states.states[i], at_start[i], *best))
+      found[i] = {initial_states.states[i], at_start[i]};
   }
+  BodySolution solution{FixStatus::ok, *best};
+  if (is_single) return solution;
   const double freedom = std::max(1.0, 2 * static_cast<double>(frame.size) - 4);
-  const double scale = std::max(1.0, best->chi_squared / freedom);
-  const bool ambiguous = second - best->chi_squared < unlikely * scale;
-  return {ambiguous ? FixStatus::ambiguous : FixStatus::ok, *best};
+  set_candidates(found, std::max(1.0, best->chi_squared / freedom), solution);
+  if (solution.num_candidates > 1) solution.status = FixStatus::ambiguous;
+  return solution;
 }
 
 /// Computes the fix with free roll and pitch from the three lamps that are farthest apart. If
@@ -243,7 +266,7 @@ std::optional<BodySolution> estimate_body_with_free_tilt(const FrameObservations
       initial_states.add(compute_level_states(frame, problem));
     const BodySolution solution = initial_states.count > 0
                                       ? find_best_body_solution(initial_states, frame, problem)
-                                      : BodySolution{initial_states.status, {}};
+                                      : BodySolution{initial_states.status};
     const bool better =
         !best || (has_fix(solution) &&
                   (!has_fix(*best) || solution.fix.chi_squared < best->fix.chi_squared));
@@ -260,7 +283,7 @@ std::optional<BodySolution> estimate_body_with_free_tilt(const FrameObservations
 BodySolution estimate_body_state_from_all_lamps(const FrameObservations& frame,
                                                 const BodyProblem& problem) {
   // Three lamps have several solutions even if roll and pitch are roughly known.
-  const bool has_several = problem.prior.inclination_sd_rad > 0 && frame.size == 3;
+  const bool has_several = problem.prior.is_tilt_estimated() && frame.size == 3;
   if (has_several || is_roll_pitch_unknown(problem.prior)) {
     if (const auto solution = estimate_body_with_free_tilt(frame, problem);
         solution && has_fix(*solution)) {
@@ -268,7 +291,7 @@ BodySolution estimate_body_state_from_all_lamps(const FrameObservations& frame,
     }
   }
   const InitialStates start = compute_level_states(frame, problem);
-  if (start.count == 0) return {start.status, {}};
+  if (start.count == 0) return {start.status};
   return find_best_body_solution(start, frame, problem);
 }
 

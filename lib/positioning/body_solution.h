@@ -7,10 +7,10 @@
 #include <cstddef>
 #include <span>
 
+#include "closed_form.h"
 #include "fix.h"
 #include "pose_estimation.h"
 #include "pose_observations.h"
-#include "sighting.h"
 
 namespace vlp {
 
@@ -24,10 +24,12 @@ inline double compute_reduced_chi_squared(double chi_squared, std::size_t lamps)
 /// outlier lamps, which can replace the fix or reject it.
 inline constexpr double kMaxReducedChiSquared = 25;
 
-/// Fix of a body, valid if the status is `ok`.
+/// Fix of a body, valid if the status is `ok`, and the candidates if it is `ambiguous`.
 struct BodySolution {
   FixStatus status;
-  BodyFix fix;
+  BodyFix fix = {};
+  int num_candidates = 0;
+  std::array<FixCandidate, 6> candidates = {};
 };
 
 /// Returns true if the status is `ok`, `ambiguous` or `undetermined`.
@@ -85,7 +87,8 @@ bool is_body_position_determined(const FrameObservations& frame, const BodyPrior
 /// Statuses:
 ///   degenerate    the lamps do not determine the position, with known motion, roll and pitch
 ///   undetermined  lamps and priors do not determine the position
-///   ambiguous     another solution is nearly as likely: by a factor of exp(-6) or more
+///   ambiguous     another state is nearly as likely: by a factor of exp(-6) or more. Such states
+///                 are the candidates.
 BodySolution estimate_body_state_from_all_lamps(const FrameObservations& frame,
                                                 const BodyProblem& problem);
 

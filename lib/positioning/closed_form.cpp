@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "geometry/plane.h"
 #include "geometry/similarity.h"
 
 namespace vlp {
@@ -52,8 +53,8 @@ TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& secon
     if (!(length > 0)) continue;
     const Eigen::Vector2d heading = turn / length;
     const Eigen::Vector2d s = first.lamp_m.head<2>() - height_m * complex_product(heading, first.z);
-    fix.poses[static_cast<std::size_t>(fix.count++)] =
-        LevelPose({s.x(), s.y(), first.lamp_m.z() - height_m}, heading).convert_to_yaw_pose();
+    fix.poses[static_cast<std::size_t>(fix.count++)] = {{s.x(), s.y(), first.lamp_m.z() - height_m},
+                                                        std::atan2(heading.y(), heading.x())};
   }
   fix.lamp_below_camera = fix.lamp_below_camera && fix.count == 0;
   return fix;

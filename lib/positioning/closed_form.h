@@ -2,15 +2,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <optional>
 #include <span>
 
 #include "../geometry/frames.h"
 #include "fix.h"
-#include "sighting.h"
 
+/// The positioning equation (Chen and Guan, eq. 1, 3, 6, 7). A level camera is at S = (X, Y, Zs)
+/// with yaw g. It observes a lamp at P = (p, Z) at the normalized point z = (x/z, y/z) of its level
+/// frame. With points of the floor plane as complex numbers, s = X + jY and H = Z - Zs:
+///   p = s + H e^{jg} z      so      z = e^{-jg} (p - s) / H.
 namespace vlp {
+
+/// Observation of a lamp of the map by a level camera.
+struct Sighting {
+  /// Position P of the lamp in the world, m.
+  Eigen::Vector3d lamp_m;
+  /// Measured point z = (x/z, y/z) in the level frame of the camera.
+  Eigen::Vector2d z;
+};
 
 /// Poses of a level camera that explain two lamps exactly: `count` of them, 0 to 2, at the
 /// beginning of `poses`.

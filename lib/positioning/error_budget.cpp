@@ -40,11 +40,11 @@ std::optional<BodyFix> find_exact_fix(FrameObservations& frame, const BodyPrior&
                                       const Pose& level) {
   const BodyProblem problem{kNoArm, prior};
   if (!prior.is_motion_or_tilt_estimated())
-    return estimate_body_state(frame.observations_span(), problem, {level, prior.mean});
+    return estimate_body_state(frame.observations_span(), problem, {level, prior.mean.motion});
   // Exact observations neither contradict the fix nor fit a mirrored map: the limit has no effect.
   constexpr double residual_limit = 0.1;
-  const auto [status, fix] = estimate_body_state_robust(frame, problem, residual_limit);
-  return status == FixStatus::ok ? std::optional(fix) : std::nullopt;
+  const BodySolution found = estimate_body_state_robust(frame, problem, residual_limit);
+  return found.status == FixStatus::ok ? std::optional(found.fix) : std::nullopt;
 }
 
 }  // namespace
@@ -71,11 +71,12 @@ std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> 
   limit.motion = limit.roll_pitch = Matrix4::Zero();
   if (!prior.is_motion_or_tilt_estimated()) return limit;
   // The fix is at rest and level to rounding.
-  limit.fix.state.motion = prior.mean;
+  limit.fix.state.motion = prior.mean.motion;
   BodyPrior level_prior = prior;
-  level_prior.inclination_sd_rad = 0;
+  level_prior.set_sd(kBodyRoll, 0);
   BodyPrior standing = level_prior;
-  standing.velocity_sd_m_per_s = standing.yaw_rate_sd_rad_per_s = 0;
+  standing.set_sd(kBodyVelocity, 0);
+  standing.set_sd(kBodyYawRate, 0);
   const auto noise = compute_pose_covariance(frame, standing, limit.fix.state),
              moving = compute_pose_covariance(frame, level_prior, limit.fix.state);
   if (!noise || !moving) return std::nullopt;

@@ -26,8 +26,9 @@ constexpr std::array<Entry, 13> kStatuses{{
     {FixStatus::duplicate_lamp, "duplicate_lamp", "one lamp occurs twice in the frame"},
     {FixStatus::not_finite, "not_finite",
      "a pixel or sensor reading is not finite, a sigma is outside 0.0001 to 1000 px, the standard "
-     "deviation of a sensor is negative, that of a known height is not positive, or an earlier "
-     "frame is not earlier or is simultaneous with another"},
+     "deviation of a sensor is negative, that of a known height is not positive, an earlier "
+     "frame is not earlier or is simultaneous with another, or a prior is not positive definite or "
+     "has other readings beside it"},
     // [FIX-8] `outside_lens` | calibration of another camera | give the right one
     {FixStatus::outside_lens, "outside_lens",
      "no ray through this lens reaches the pixel: is it the calibration of this camera?"},

@@ -36,42 +36,62 @@ std::string_view fix_status_name(FixStatus status);
 /// Returns an explanation of a status with the remedy, human-readable, in one line.
 std::string_view describe_fix_status(FixStatus status);
 
-/// A pose and the covariance of its (X, Y, Z, yaw) in meters and radians.
-struct PoseEstimate {
-  Pose pose;
-  Matrix4 covariance;
-};
-
-/// Indices of the states of a body in covariances: X, Y, Z, yaw, velocity, yaw rate, roll, pitch.
-enum BodyIndex { kBodyYaw = 3, kBodyVelocity = 4, kBodyYawRate = 6, kBodyRoll = 7, kBodyPitch = 8 };
-inline constexpr int kBodyStates = 9;
-using BodyCovariance = Eigen::Matrix<double, kBodyStates, kBodyStates, Eigen::DontAlign>;
-
-/// Estimated motion, roll and pitch of the robot, or, without a mount, of the camera.
-struct BodyEstimate {
-  /// Velocity (x, y) in the world frame.
+/// Motion, roll and pitch of a body: the robot, or, without a mount, the camera.
+struct BodyMotion {
+  /// Horizontal velocity u along the axes of the body's level frame.
   Eigen::Vector2d velocity_m_per_s{0, 0};
   double yaw_rate_rad_per_s = 0;
   Inclination inclination{0, 0};
-  /// Covariance of (X, Y, Z, yaw, vx, vy, yaw rate, roll, pitch) in meters, radians and seconds.
-  /// Includes all known errors, as in Fix::estimate. Zero for quantities given as exact.
-  BodyCovariance covariance = BodyCovariance::Zero();
-  /// Part of the covariance due to this frame: pixels and priors combined.
-  BodyCovariance noise_covariance = BodyCovariance::Zero();
 };
 
-/// Result for one frame. The members below `status` are valid only if it is `ok`.
+/// Pose of the level frame of a body, and its motion, at the middle of the exposure of the image's
+/// middle row.
+struct BodyState {
+  Pose pose{{0, 0, 0}, 0};
+  BodyMotion motion = {};
+};
+
+/// Indices of the states of a body in covariances and derivatives, in meters, radians and seconds:
+/// X, Y, Z, yaw, velocity (2), yaw rate, roll, pitch.
+enum BodyIndex {
+  kBodyZ = 2,
+  kBodyYaw = 3,
+  kBodyVelocity = 4,
+  kBodyYawRate = 6,
+  kBodyRoll = 7,
+  kBodyPitch = 8
+};
+inline constexpr int kBodyStates = 9;
+using BodyCovariance = Eigen::Matrix<double, kBodyStates, kBodyStates, Eigen::DontAlign>;
+
+/// A state that explains a frame, and its likelihood relative to the sum over all candidates.
+struct FixCandidate {
+  BodyState state;
+  double likelihood = 0;
+};
+
+/// Result for one frame. The members below `candidates` are valid only if `status` is `ok`.
 struct Fix {
   FixStatus status = FixStatus::too_few_lamps;
-  /// Pose of the camera, or of the robot's center if there is a CameraMount. The covariance of (X,
-  /// Y, Z, yaw) includes all known errors: noise_covariance, and the errors of calibration and lamp
-  /// map as far as they are reported (correlated_errors.h). If the residuals contradict the noise
-  /// (probability below 1e-4), it includes an unknown tilt or motion that explains them.
-  PoseEstimate estimate;
-  /// Part of the covariance due to pixel noise and inclination, and, for one lamp, height, yaw and
-  /// motion. It averages out over frames as far as these errors are independent between frames. The
-  /// reported noise is scaled if neither it nor a tilt or motion explains the residuals.
-  Matrix4 noise_covariance = Matrix4::Zero();
+  /// Number of detections whose id is not in the lamp map; these are ignored. Valid for every
+  /// status.
+  int unknown_lamps = 0;
+  /// States that explain the frame if the status is `ambiguous`, the most likely one first:
+  /// `num_candidates` of them at the beginning.
+  int num_candidates = 0;
+  std::array<FixCandidate, 6> candidates = {};
+  /// State of the robot's center if there is a CameraMount, otherwise of the camera. States that
+  /// are not estimated are as given.
+  BodyState state;
+  /// Covariance of the state (BodyIndex) from all known errors: noise_covariance, and the errors of
+  /// calibration and lamp map as far as they are reported (correlated_errors.h). Zero for states
+  /// given as exact. If the residuals contradict the noise (probability below 1e-4), it includes an
+  /// unknown tilt or motion that explains them.
+  BodyCovariance covariance = BodyCovariance::Zero();
+  /// Part of the covariance due to this frame: pixels and priors. It averages out over frames as
+  /// far as these errors are independent between frames. The reported noise is scaled if neither it
+  /// nor a tilt or motion explains the residuals.
+  BodyCovariance noise_covariance = BodyCovariance::Zero();
   /// RMS distance in the image between the observed and the predicted lamps, over both axes
   /// together. Zero, to rounding, with one or two lamps.
   double residual_px = 0;
@@ -83,9 +103,6 @@ struct Fix {
   /// them.
   int rejected_lamps = 0;
   std::array<int, 32> rejected_ids = {};
-  /// Number of detections whose id is not in the lamp map; these are ignored. Valid for every
-  /// status.
-  int unknown_lamps = 0;
   /// Degrees of freedom of the pixel residuals. A body at rest with known roll and pitch has 2n - 4
   /// for three lamps or more; each other estimated quantity reduces them. If sigma_px is not
   /// reported, the expectation of chi_squared for unit noise in the image.
@@ -94,15 +111,15 @@ struct Fix {
   /// `redundancy` plus common_chi_squared.
   double chi_squared = 0;
   /// Expected contribution of the errors of calibration and lamp map to chi_squared, as far as they
-  /// are reported. 0 without PositionerOptions::computes_common_chi_squared.
+  /// are reported. 0 if chi_squared is not above `redundancy`.
   double common_chi_squared = 0;
-  /// Motion, roll and pitch if Sensors leave them free.
-  std::optional<BodyEstimate> body;
   /// Sensors::time_s: the middle of the exposure of the image's middle row, to which the fix
   /// refers.
   std::optional<double> time_s;
 
   bool has_succeeded() const { return status == FixStatus::ok; }
+  /// Returns the covariance of (X, Y, Z, yaw).
+  Matrix4 pose_covariance() const { return covariance.topLeftCorner<4, 4>(); }
 };
 
 }  // namespace vlp

@@ -15,14 +15,8 @@ Eigen::Vector2d turn_over(const Eigen::Vector2d& v) { return {v.x(), -v.y()}; }
 /// Signs of X, Y, Z, yaw, velocity, yaw rate, roll and pitch (BodyIndex).
 constexpr std::array<double, kBodyStates> kSigns{1, -1, -1, -1, 1, -1, -1, 1, -1};
 
-template <typename Covariance>
-void change_signs(Covariance& covariance) {
-  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
-    for (Eigen::Index k = 0; k < covariance.cols(); ++k) {
-      covariance(i, k) *= kSigns[static_cast<std::size_t>(i)] * kSigns[static_cast<std::size_t>(k)];
-    }
-  }
-}
+const Eigen::DiagonalMatrix<double, kBodyStates> kTurnedOver(
+    Eigen::Map<const Eigen::Matrix<double, kBodyStates, 1>>(kSigns.data()));
 
 }  // namespace
 
@@ -59,6 +53,14 @@ Calibration turn_over(Calibration calibration) {
   return calibration;
 }
 
+BodyState turn_over(BodyState state) {
+  auto& [pose, motion] = state;
+  pose = {turn_over(pose.position_m), -pose.yaw_rad};
+  return {pose,
+          {turn_over(motion.velocity_m_per_s), -motion.yaw_rate_rad_per_s,
+           turn_over(motion.inclination)}};
+}
+
 Sensors turn_over(Sensors sensors) {
   if (sensors.inclination) sensors.inclination = turn_over(*sensors.inclination);
   if (auto& known = sensors.height_and_yaw) {
@@ -70,22 +72,23 @@ Sensors turn_over(Sensors sensors) {
     motion->yaw_rate_rad_per_s *= -1;
   }
   if (sensors.height) sensors.height->z_m *= -1;
+  if (auto& prior = sensors.prior) {
+    prior = {turn_over(prior->mean), kTurnedOver * prior->covariance * kTurnedOver};
+  }
   return sensors;
 }
 
 Fix turn_over(Fix fix) {
-  Pose& pose = fix.estimate.pose;
-  pose = {turn_over(pose.position_m), -pose.yaw_rad};
-  change_signs(fix.estimate.covariance);
-  change_signs(fix.noise_covariance);
-  if (auto& body = fix.body) {
-    body->velocity_m_per_s = turn_over(body->velocity_m_per_s);
-    body->yaw_rate_rad_per_s *= -1;
-    body->inclination = turn_over(body->inclination);
-    change_signs(body->covariance);
-    change_signs(body->noise_covariance);
-  }
+  fix.state = turn_over(fix.state);
+  for (FixCandidate& candidate : fix.candidates) candidate.state = turn_over(candidate.state);
+  fix.covariance = kTurnedOver * fix.covariance * kTurnedOver;
+  fix.noise_covariance = kTurnedOver * fix.noise_covariance * kTurnedOver;
   return fix;
+}
+
+LampProjection turn_over(LampProjection projection) {
+  projection.jacobian = projection.jacobian * kTurnedOver;
+  return projection;
 }
 
 }  // namespace vlp

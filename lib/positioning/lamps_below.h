@@ -18,8 +18,10 @@ LampMap turn_over(LampMap map);
 /// Rotates positions and errors of the lamps; the rest refers to the camera.
 Calibration turn_over(Calibration calibration);
 Sensors turn_over(Sensors sensors);
-/// Rotates pose, motion and covariances of a fix.
+BodyState turn_over(BodyState state);
+/// Rotates states and covariances of a fix.
 Fix turn_over(Fix fix);
+LampProjection turn_over(LampProjection projection);
 
 /// Returns turn_over(value) for a map with lamps below the camera, otherwise the value.
 template <typename Value>

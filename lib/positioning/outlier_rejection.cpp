@@ -52,8 +52,9 @@ double compute_residual_limit(const FrameObservations& frame, double max_residua
   return std::min(max_residual_fraction * std::sqrt(sum_m2 / n), max_neighbor_fraction * nearest_m);
 }
 
-/// Returns true if each quantity with a prior is within five standard deviations of its mean. The
-/// two components of velocity, and of the inclination, count together.
+/// Returns true if each quantity with a prior is within five standard deviations of its mean, given
+/// the quantities before it. The components of the position, of velocity, and of the inclination
+/// count together.
 bool is_within_prior(const BodyPrior& prior, const BodyState& state) {
   constexpr double max_sds = 5;
   constexpr std::array<std::size_t, kBodyStates> quantities{0, 0, 0, 1, 2, 2, 3, 4, 4};
@@ -135,7 +136,8 @@ Agreeing find_majority_with_unknown_tilt(const FrameObservations& frame, const B
 /// pairs.
 Agreeing find_majority_if_level(const FrameObservations& frame, const BodyProblem& problem,
                                 double limit_m) {
-  const Eigen::Matrix3d lean = level_rotation_from_inclination(problem.prior.mean.inclination);
+  const Eigen::Matrix3d lean =
+      level_rotation_from_inclination(problem.prior.mean.motion.inclination);
   const LevelSightings level(frame, lean);
   if (!level.are_lamps_above_horizon) return {};
   const std::size_t stride = 1 + level.size / 65;
@@ -156,13 +158,13 @@ Agreeing find_majority_if_level(const FrameObservations& frame, const BodyProble
 /// Computes the fix of a majority of the lamps, and removes the others from the frame.
 BodySolution estimate_body_from_majority(FrameObservations& frame, const BodyProblem& problem,
                                          double max_residual_fraction) {
-  const BodySolution none{FixStatus::inconsistent, {}};
+  const BodySolution none{FixStatus::inconsistent};
   const double limit_m = compute_residual_limit(frame, max_residual_fraction);
   double latest_s = 0;
   for (const LampObservation& seen : frame.observations_span()) {
     latest_s = std::max(latest_s, std::abs(seen.time_s));
   }
-  const double driven_m = 2 * problem.prior.velocity_sd_m_per_s * latest_s;
+  const double driven_m = 2 * std::sqrt(problem.prior.max_variance(kBodyVelocity, 2)) * latest_s;
   const bool is_tilt_unknown = is_roll_pitch_unknown(problem.prior);
   const std::size_t min_lamps = is_tilt_unknown ? 4 : 3;  // one more than propose a state
   Agreeing agreeing = is_tilt_unknown
@@ -175,7 +177,7 @@ BodySolution estimate_body_from_majority(FrameObservations& frame, const BodyPro
     const FrameObservations remaining = select_lamps(frame, agreeing);
     if (remaining.num_current < 2) return none;
     const BodySolution solution = estimate_body_state_from_all_lamps(remaining, problem);
-    if (solution.status != FixStatus::ok) return {solution.status, solution.fix};
+    if (solution.status != FixStatus::ok) return solution;
     const Agreeing now_agreeing = Agreement(solution.fix.state, frame, problem, limit_m).agreeing;
     if (now_agreeing == agreeing) {
       if (!is_within_prior(problem.prior, solution.fix.state)) return none;
@@ -195,7 +197,7 @@ BodySolution estimate_body_state_robust(FrameObservations& frame, const BodyProb
   if (frame.size < 3) {
     const bool is_contradicted =
         all.status == FixStatus::ok && !is_within_prior(problem.prior, all.fix.state);
-    return is_contradicted ? BodySolution{FixStatus::inconsistent, {}} : all;
+    return is_contradicted ? BodySolution{FixStatus::inconsistent} : all;
   }
   const double limit_m = compute_residual_limit(frame, max_residual_fraction);
   const bool is_all_consistent = is_consistent(all, frame, problem, limit_m);
@@ -209,11 +211,11 @@ BodySolution estimate_body_state_robust(FrameObservations& frame, const BodyProb
       is_consistent(mirror_image, mirror_frame, problem, limit_m) &&
       (!is_all_consistent ||
        kClearGain * compute_reduced_chi_squared(mirror_image.fix.chi_squared, frame.size) < excess);
-  if (is_mirrored) return {FixStatus::mirrored_map, {}};
+  if (is_mirrored) return {FixStatus::mirrored_map};
   // Constant velocity and yaw rate do not explain the earlier frames.
-  if (is_all_consistent && frame.num_current < frame.size) return {FixStatus::inconsistent, {}};
+  if (is_all_consistent && frame.num_current < frame.size) return {FixStatus::inconsistent};
   if (is_all_consistent) return all;
-  if (frame.size < 4) return has_fix(all) ? BodySolution{FixStatus::inconsistent, {}} : all;
+  if (frame.size < 4) return has_fix(all) ? BodySolution{FixStatus::inconsistent} : all;
   const BodySolution majority = estimate_body_from_majority(frame, problem, max_residual_fraction);
   if (majority.status == FixStatus::inconsistent && !has_fix(all)) return all;
   return majority;
@@ -303,8 +305,7 @@ class LinearizedFrame {
       }
     }
     for (const PriorTerm& prior : priors_.list()) {
-      BodyVector row = prior.weight * BodyVector::Unit(prior.state);
-      row.tail<2>() += prior.weight * prior.d_inclination;
+      const BodyVector row = is_fixed_.select(0, prior.row.array());
       normal.add_residual_row(row, prior.residual);
     }
     for (std::size_t i = 0; i < kBodyStates; ++i) {

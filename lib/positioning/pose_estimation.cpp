@@ -102,12 +102,9 @@ struct States {
   }
   /// Returns the derivatives of a prior with respect to the estimated states.
   static std::array<double, kCount> make_prior_row(const PriorTerm& prior) {
-    std::array<double, kCount> row{};
-    row[state_positions()[static_cast<std::size_t>(prior.state)]] = prior.weight;
-    if constexpr (lean) {
-      row[kLean] += prior.weight * prior.d_inclination.x();
-      row[kLean + 1] += prior.weight * prior.d_inclination.y();
-    }
+    constexpr auto indices = estimated_state_indices();
+    std::array<double, kCount> row;
+    for (std::size_t i = 0; i < kCount; ++i) row[i] = prior.row[indices[i]];
     return row;
   }
 };
@@ -173,12 +170,13 @@ struct Linearized : Normal<S::kCount> {
     constexpr auto positions = S::state_positions();
     const PriorTerms priors = compute_prior_terms(problem.prior, at);
     for (const PriorTerm& prior : priors.list()) {
-      const std::size_t i = positions[static_cast<std::size_t>(prior.state)];
-      if (prior.state == 2) {
-        this->add_residual_row(S::make_prior_row(prior), prior.residual);
+      if (prior.is_diagonal) {
+        const std::size_t i = positions[static_cast<std::size_t>(prior.state)];
+        const double weight = prior.row[prior.state];
+        this->information[i][i] += weight * weight;
+        this->gradient[i] += weight * prior.residual;
       } else {
-        this->information[i][i] += prior.weight * prior.weight;
-        this->gradient[i] += prior.weight * prior.residual;
+        this->add_residual_row(S::make_prior_row(prior), prior.residual);
       }
       chi_squared += prior.residual * prior.residual;
     }
@@ -303,56 +301,92 @@ Eigen::Vector3d EvaluatedState::lamp_position_in_body(const Eigen::Vector3d& lam
   return compute_lamp_terms(*this, lamp_m, time_s).in_body;
 }
 
+LinearizedLampPosition linearize_lamp_position(const Eigen::Vector3d& lamp_m, double time_s,
+                                               const EvaluatedState& body,
+                                               const Eigen::Vector3d& arm_m) {
+  const LampTerms terms = compute_lamp_terms(body, lamp_m, time_s);
+  LinearizedLampPosition lamp{terms.in_body - arm_m, {}, {}};
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto row = States<true, true, true>::make_row(body, terms, 1, Eigen::Vector3d::Unit(axis),
+                                                        body.body_from_level.row(axis));
+    lamp.jacobian.row(axis) = Eigen::Map<const BodyVector>(row.data());
+  }
+  // Derivatives with respect to u t and w t.
+  auto by_motion = lamp.jacobian.middleCols<3>(kBodyVelocity);
+  const BodyMotion& motion = body.state.motion;
+  lamp.velocity_m_per_s = by_motion.leftCols<2>() * motion.velocity_m_per_s +
+                          by_motion.col(2) * motion.yaw_rate_rad_per_s;
+  by_motion *= time_s;
+  return lamp;
+}
+
 LinearizedObservation linearize_observation(const LampObservation& sighting,
                                             const EvaluatedState& body,
                                             const Eigen::Vector3d& arm_m) {
-  const LampTerms terms = compute_lamp_terms(body, sighting.lamp_m, sighting.time_s);
-  const LampResidual residual = compute_lamp_residual(sighting, terms.in_body - arm_m);
-  const Matrix23 d_pixel_d_q = d_pixel_d_lamp_in_body(sighting, residual);
-  const Matrix23 d_pixel_d_level = d_pixel_d_q.lazyProduct(body.body_from_level);
-  LinearizedObservation linearized{residual.value, {}};
-  for (const int axis : {0, 1}) {
-    const auto row = States<true, true, true>::make_row(
-        body, terms, sighting.time_s, d_pixel_d_q.row(axis), d_pixel_d_level.row(axis));
-    for (int i = 0; i < kBodyStates; ++i)
-      linearized.jacobian(axis, i) = row[static_cast<std::size_t>(i)];
-  }
-  return linearized;
+  const auto lamp = linearize_lamp_position(sighting.lamp_m, sighting.time_s, body, arm_m);
+  const LampResidual residual = compute_lamp_residual(sighting, lamp.q);
+  return {residual.value, d_pixel_d_lamp_in_body(sighting, residual).lazyProduct(lamp.jacobian)};
+}
+
+Eigen::Matrix<double, kBodyStates, 1> compute_state_difference(const BodyState& to,
+                                                               const BodyState& from) {
+  const BodyMotion &a = to.motion, &b = from.motion;
+  BodyVector difference;
+  difference << to.pose.position_m - from.pose.position_m,
+      wrap_angle_rad(to.pose.yaw_rad - from.pose.yaw_rad), a.velocity_m_per_s - b.velocity_m_per_s,
+      a.yaw_rate_rad_per_s - b.yaw_rate_rad_per_s,
+      wrap_angle_rad(a.inclination.roll_rad - b.inclination.roll_rad),
+      wrap_angle_rad(a.inclination.pitch_rad - b.inclination.pitch_rad);
+  return difference;
 }
 
 PriorTerms compute_prior_terms(const BodyPrior& prior, const EvaluatedState& body) {
-  constexpr double exact_sd = 1e-9;
+  constexpr double min_variance = 1e-18;
+  const std::array<bool, 3> is_free{prior.is_velocity_estimated(), prior.is_yaw_rate_estimated(),
+                                    prior.is_tilt_estimated()};
+  constexpr std::array<std::size_t, kBodyStates> quantity{0, 0, 0, 0, 0, 0, 1, 2, 2};
   PriorTerms priors;
-  const auto add = [&](int state, double sd, double difference) {
-    PriorTerm& term = priors.terms[priors.size++];
-    term = {state, 1 / sd, difference / sd, {0, 0}};
-    return &term;
-  };
-  const BodyMotion &motion = body.state.motion, &mean = prior.mean;
-  if (const auto& height = prior.height) {
-    const Eigen::Matrix3d body_from_level = body.body_from_level;
-    const Eigen::Vector3d& point_m = prior.height_point_m;
-    const double height_m = body.state.pose.position_m.z() + body_from_level.col(2).dot(point_m);
-    add(2, std::max(height->sd_m, exact_sd), height->z_m - height_m)->d_inclination = {
-        point_m.y() * body_from_level(2, 2) - point_m.z() * body_from_level(1, 2),
-        -body_from_level.col(0).dot(point_m)};
-  }
-  if (const auto& yaw = prior.yaw) {
-    add(kBodyYaw, std::max(yaw->sd_rad, exact_sd),
-        wrap_angle_rad(yaw->yaw_rad - body.state.pose.yaw_rad));
-  }
-  if (const double sd = prior.velocity_sd_m_per_s; sd > 0) {
-    for (const int axis : {0, 1}) {
-      add(kBodyVelocity + axis, sd, (mean.velocity_m_per_s - motion.velocity_m_per_s)[axis]);
+  std::array<std::array<double, kBodyStates>, kBodyStates> lower;
+  BodyVector difference;
+  for (int state = 0; state < kBodyStates; ++state) {
+    const double variance = prior.covariance(state, state);
+    const bool is_fixed =
+        state >= kBodyVelocity && !is_free[quantity[static_cast<std::size_t>(state)]];
+    if (is_fixed || std::isinf(variance)) continue;
+    if (priors.size == 0) difference = compute_state_difference(prior.mean, body.state);
+    PriorTerm& term = priors.terms[priors.size];
+    term = {state, true, difference[state], BodyVector::Unit(state)};
+    if (state == kBodyZ && !prior.height_point_m.isZero(0)) {
+      const Eigen::Matrix3d body_from_level = body.body_from_level;
+      const Eigen::Vector3d& point_m = prior.height_point_m;
+      term.residual -= body_from_level.col(2).dot(point_m);
+      term.row[kBodyRoll] =
+          point_m.y() * body_from_level(2, 2) - point_m.z() * body_from_level(1, 2);
+      term.row[kBodyPitch] = -body_from_level.col(0).dot(point_m);
+      term.is_diagonal = false;
     }
-  }
-  if (const double sd = prior.yaw_rate_sd_rad_per_s; sd > 0) {
-    add(kBodyYawRate, sd, mean.yaw_rate_rad_per_s - motion.yaw_rate_rad_per_s);
-  }
-  if (const double sd = prior.inclination_sd_rad; sd > 0) {
-    const Inclination &from = mean.inclination, &to = motion.inclination;
-    add(kBodyRoll, sd, wrap_angle_rad(from.roll_rad - to.roll_rad));
-    add(kBodyPitch, sd, wrap_angle_rad(from.pitch_rad - to.pitch_rad));
+    double remaining = std::max(variance, min_variance);
+    auto& factor = lower[priors.size];
+    for (std::size_t k = 0; k < priors.size; ++k) {
+      const PriorTerm& before = priors.terms[k];
+      double covariance = variance > 0 ? prior.covariance(state, before.state) : 0;
+      for (std::size_t m = 0; m < k; ++m) covariance -= factor[m] * lower[k][m];
+      factor[k] = covariance / lower[k][k];
+      if (factor[k] == 0) continue;
+      remaining -= factor[k] * factor[k];
+      term.residual -= factor[k] * before.residual;
+      term.row -= factor[k] * before.row;
+      term.is_diagonal = false;
+    }
+    factor[priors.size] = std::sqrt(remaining);
+    const double inverse = 1 / factor[priors.size];
+    term.residual *= inverse;
+    if (term.is_diagonal) {
+      term.row[state] = inverse;
+    } else {
+      term.row *= inverse;
+    }
+    ++priors.size;
   }
   return priors;
 }
@@ -386,8 +420,8 @@ std::optional<BodyFix> estimate_body_state(std::span<const LampObservation> sigh
       solve<States<false, false, true>>,  solve<States<true, false, true>>,
       solve<States<false, true, true>>,   solve<States<true, true, true>>};
   const BodyPrior& prior = problem.prior;
-  const int index = 1 * (prior.velocity_sd_m_per_s > 0) + 2 * (prior.yaw_rate_sd_rad_per_s > 0) +
-                    4 * (prior.inclination_sd_rad > 0);
+  const int index = 1 * prior.is_velocity_estimated() + 2 * prior.is_yaw_rate_estimated() +
+                    4 * prior.is_tilt_estimated();
   return solvers[static_cast<std::size_t>(index)](sightings, problem, start);
 }
 

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -24,7 +25,7 @@
 ///   u    velocity in the body's level frame, horizontal: a body does not climb
 ///   w    yaw rate
 ///   L    Ry(pitch) Rx(roll), the roll and pitch of the body
-/// For a level camera at rest this is the positioning equation (sighting.h).
+/// For a level camera at rest this is the positioning equation (closed_form.h).
 ///
 /// One image determines the motion: velocity along the readout direction stretches the pattern of
 /// lamps, velocity across it shears the pattern. A level camera at rest produces neither effect.
@@ -32,46 +33,35 @@
 /// lamps determine all three.
 namespace vlp {
 
-/// Motion, roll and pitch of a body: the states that may be estimated in addition to its position R
-/// and yaw g.
-struct BodyMotion {
-  /// Horizontal velocity u along the axes of the body's level frame.
-  Eigen::Vector2d velocity_m_per_s{0, 0};
-  double yaw_rate_rad_per_s = 0;
-  Inclination inclination{0, 0};
-};
-
-/// Pose and motion of a body at time 0.
-struct BodyState {
-  Pose pose{{0, 0, 0}, 0};
-  BodyMotion motion = {};
-};
-
-/// Yaw with its standard deviation; 0: exact.
-struct KnownYaw {
-  double yaw_rad, sd_rad;
-};
-
-/// Prior knowledge of the state: each quantity is normally distributed about its mean, with its
-/// standard deviation per component. Motion and inclination with standard deviation 0 are fixed at
-/// their mean.
-struct BodyPrior {
-  BodyMotion mean = {};
-  double velocity_sd_m_per_s = 0;
-  double yaw_rate_sd_rad_per_s = 0;
-  double inclination_sd_rad = 0;
-  /// Prior of the height of the point `height_point_m` of the body, or of its yaw; std::nullopt:
-  /// unknown. A standard deviation of 0 counts as 1e-9.
-  std::optional<KnownHeight> height = {};
-  std::optional<KnownYaw> yaw = {};
+/// Prior of the state in which the height is that of a point of the body. By default, the pose is
+/// unknown, and the body is level and at rest. Motion with variance 0, and roll and pitch, are
+/// fixed at their mean; other states with variance 0 have a standard deviation of 1e-9.
+struct BodyPrior : StatePrior {
   /// Position in the body frame, m.
   Eigen::Vector3d height_point_m{0, 0, 0};
 
+  BodyPrior() {
+    covariance.diagonal().head<4>().setConstant(std::numeric_limits<double>::infinity());
+  }
+
+  /// Sets the standard deviation of a state without correlations; kBodyVelocity: of both
+  /// components; kBodyRoll: of roll and pitch.
+  void set_sd(BodyIndex state, double sd) {
+    const int count = state == kBodyVelocity || state == kBodyRoll ? 2 : 1;
+    covariance.middleRows(state, count).setZero();
+    covariance.middleCols(state, count).setZero();
+    covariance.diagonal().segment(state, count).setConstant(sd * sd);
+  }
+  bool is_velocity_estimated() const { return max_variance(kBodyVelocity, 2) > 0; }
+  bool is_yaw_rate_estimated() const { return max_variance(kBodyYawRate, 1) > 0; }
+  bool is_tilt_estimated() const { return max_variance(kBodyRoll, 2) > 0; }
   /// Returns true if velocity or yaw rate are estimated together with the pose.
-  bool is_motion_estimated() const { return velocity_sd_m_per_s > 0 || yaw_rate_sd_rad_per_s > 0; }
+  bool is_motion_estimated() const { return is_velocity_estimated() || is_yaw_rate_estimated(); }
   /// Returns true if velocity, yaw rate or roll and pitch are estimated together with the pose.
-  bool is_motion_or_tilt_estimated() const {
-    return is_motion_estimated() || inclination_sd_rad > 0;
+  bool is_motion_or_tilt_estimated() const { return is_motion_estimated() || is_tilt_estimated(); }
+  /// Returns the largest variance of `count` states from `state` on.
+  double max_variance(int state, int count) const {
+    return covariance.diagonal().segment(state, count).maxCoeff();
   }
 };
 
@@ -115,6 +105,16 @@ class EvaluatedState {
   Eigen::Vector3d pitch_axis;
 };
 
+/// Position q of a lamp relative to the camera along the axes of the body, m, its derivatives with
+/// respect to all states, and its velocity dq/dt.
+struct LinearizedLampPosition {
+  Eigen::Vector3d q, velocity_m_per_s;
+  Eigen::Matrix<double, 3, kBodyStates> jacobian;
+};
+LinearizedLampPosition linearize_lamp_position(const Eigen::Vector3d& lamp_m, double time_s,
+                                               const EvaluatedState& body,
+                                               const Eigen::Vector3d& arm_m);
+
 /// Residual of an observation, in standard deviations, and derivative of its prediction with
 /// respect to all states.
 struct LinearizedObservation {
@@ -125,23 +125,29 @@ LinearizedObservation linearize_observation(const LampObservation& sighting,
                                             const EvaluatedState& body,
                                             const Eigen::Vector3d& arm_m);
 
-/// Prior of one state: its index (BodyIndex), 1 / sd, and mean minus state, in standard deviations.
+/// Residual of the prior, whitened: mean minus state, given the residuals of the states before
+/// `state`, in standard deviations; and its derivatives. `is_diagonal` if only that by `state` is
+/// not zero.
 struct PriorTerm {
   int state;
-  double weight, residual;
-  /// Derivatives of the prior quantity with respect to roll and pitch, m; zero except for the
-  /// height.
-  Eigen::Vector2d d_inclination;
+  bool is_diagonal;
+  double residual;
+  Eigen::Matrix<double, kBodyStates, 1> row;
 };
 
-/// Priors of the states that are neither free nor fixed: `size` terms at the beginning.
+/// Terms of the states with a prior that are not fixed: `size` terms at the beginning. The
+/// residuals are L^-1 (mean - state), with the Cholesky factor L of the covariance of these states.
 struct PriorTerms {
-  std::array<PriorTerm, 7> terms;
+  std::array<PriorTerm, kBodyStates> terms;
   std::size_t size = 0;
 
   std::span<const PriorTerm> list() const { return {terms.data(), size}; }
 };
 PriorTerms compute_prior_terms(const BodyPrior& prior, const EvaluatedState& body);
+
+/// Returns the difference of two states (BodyIndex).
+Eigen::Matrix<double, kBodyStates, 1> compute_state_difference(const BodyState& to,
+                                                               const BodyState& from);
 
 /// Computes the sum of the squared residuals of pixels and priors over their variances at `state`.
 /// Returns std::nullopt if a lamp is behind its ray.

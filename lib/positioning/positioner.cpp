@@ -18,7 +18,6 @@
 #include "geometry/angles.h"
 #include "geometry/plane.h"
 #include "positioning/correlated_errors.h"
-#include "positioning/known_motion.h"
 #include "positioning/lamps_below.h"
 #include "positioning/outlier_rejection.h"
 #include "positioning/pose_observations.h"
@@ -58,22 +57,29 @@ std::vector<Lamp> sorted_by_id(std::vector<Lamp> lamps) {
 
 bool is_valid_sd(double value) { return std::isfinite(value) && value >= 0; }
 
-bool are_values_finite(const KnownMotion& motion) {
-  return motion.velocity_m_per_s.allFinite() && std::isfinite(motion.yaw_rate_rad_per_s) &&
-         is_valid_sd(motion.velocity_sd_m_per_s) && is_valid_sd(motion.yaw_rate_sd_rad_per_s);
+/// Returns true if the mean is finite, and the covariance positive definite.
+bool is_valid_prior(const BodyPrior& prior) {
+  const auto variances = prior.covariance.diagonal().array();
+  const PriorTerms terms = compute_prior_terms(prior, EvaluatedState(BodyState()));
+  return (variances >= 0).all() && variances.tail<5>().isFinite().all() &&
+         compute_state_difference(prior.mean, {}).allFinite() &&
+         std::ranges::all_of(terms.list(),
+                             [](const PriorTerm& term) { return term.row.allFinite(); });
 }
 
-bool are_values_finite(const Sensors& sensors) {
-  const auto& lean = sensors.inclination;
+bool are_values_valid(const Sensors& sensors) {
   const auto& known = sensors.height_and_yaw;
   const auto& height = sensors.height;
+  const auto& motion = sensors.motion;
+  const bool are_there_readings =
+      sensors.inclination || sensors.inclination_sigma_rad != 0 || motion || height || known;
   return is_valid_sd(sensors.inclination_sigma_rad) &&
-         (!sensors.motion || are_values_finite(*sensors.motion)) &&
-         (!height ||
-          (std::isfinite(height->z_m) && is_valid_sd(height->sd_m) && height->sd_m > 0)) &&
-         (!lean || (std::isfinite(lean->roll_rad) && std::isfinite(lean->pitch_rad))) &&
+         (!motion || (is_valid_sd(motion->velocity_sd_m_per_s) &&
+                      is_valid_sd(motion->yaw_rate_sd_rad_per_s))) &&
+         (!height || (is_valid_sd(height->sd_m) && height->sd_m > 0)) &&
          (!known || (std::isfinite(known->z_m) && std::isfinite(known->yaw_rad) &&
-                     is_valid_sd(known->z_sd_m) && is_valid_sd(known->yaw_sd_rad)));
+                     is_valid_sd(known->z_sd_m) && is_valid_sd(known->yaw_sd_rad))) &&
+         !(sensors.prior && are_there_readings);
 }
 
 /// Returns true if all frames are earlier than the current one, and no two of them simultaneous.
@@ -109,47 +115,6 @@ std::vector<double> compute_distances_to_nearest_lamp(const std::vector<Lamp>& l
     for (auto before = lamp; before != sorted.begin() && improve(*std::prev(before));) --before;
   }
   return nearest_m;
-}
-
-/// Returns true if the result has a BodyEstimate: more than a pose is estimated from two lamps or
-/// more, or the camera moves during the readout, or its height is known.
-bool has_body_estimate(const Sensors& sensors) {
-  return sensors.inclination_sigma_rad > 0 || sensors.height ||
-         (sensors.motion && may_camera_move_during_readout(*sensors.motion));
-}
-
-/// Rotates velocity and covariances from the level frame to the world. `common` is added to the
-/// covariance of the fix's own noise.
-BodyEstimate rotate_estimate_to_world(const BodyFix& fix, const BodyCovariance& common) {
-  const Eigen::Rotation2Dd world_from_level(fix.state.pose.yaw_rad);
-  const BodyMotion& motion = fix.state.motion;
-  BodyEstimate estimate{world_from_level * motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
-                        motion.inclination, fix.covariance + common, fix.covariance};
-  const Eigen::Matrix2d turn = world_from_level.toRotationMatrix();
-  const Eigen::Vector2d by_yaw(-estimate.velocity_m_per_s.y(), estimate.velocity_m_per_s.x());
-  for (BodyCovariance* covariance : {&estimate.covariance, &estimate.noise_covariance}) {
-    covariance->middleRows<2>(kBodyVelocity) =
-        (turn.lazyProduct(covariance->middleRows<2>(kBodyVelocity)) +
-         by_yaw.lazyProduct(covariance->row(kBodyYaw)))
-            .eval();
-    covariance->middleCols<2>(kBodyVelocity) =
-        (covariance->middleCols<2>(kBodyVelocity).lazyProduct(turn.transpose()) +
-         covariance->col(kBodyYaw).lazyProduct(by_yaw.transpose()))
-            .eval();
-  }
-  return estimate;
-}
-
-/// Returns the difference of two states, in the order of BodyIndex.
-Eigen::Matrix<double, kBodyStates, 1> compute_state_difference(const BodyState& to,
-                                                               const BodyState& from) {
-  const BodyMotion &a = to.motion, &b = from.motion;
-  Eigen::Matrix<double, kBodyStates, 1> difference;
-  difference << to.pose.position_m - from.pose.position_m,
-      wrap_angle_rad(to.pose.yaw_rad - from.pose.yaw_rad), a.velocity_m_per_s - b.velocity_m_per_s,
-      a.yaw_rate_rad_per_s - b.yaw_rate_rad_per_s, a.inclination.roll_rad - b.inclination.roll_rad,
-      a.inclination.pitch_rad - b.inclination.pitch_rad;
-  return difference;
 }
 
 /// Returns the covariance of x and y, m^2, from second-order effects of the errors of yaw and
@@ -203,7 +168,6 @@ class Positioner::Impl {
         body_from_camera_(body_from_base_ * base_from_camera_),
         max_residual_fraction_(options.max_residual_fraction),
         unstated_sigma_px_(options.unstated_sigma_px),
-        computes_common_chi_squared_(options.computes_common_chi_squared),
         row_clock_(make_readout_clock(calibration.camera)) {
     for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
     nearest_m_ = compute_distances_to_nearest_lamp(lamps_);
@@ -221,32 +185,77 @@ class Positioner::Impl {
 
   Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
                            std::span<const EarlierFrame> earlier) const {
-    if (!are_values_finite(sensors) || !are_times_valid(earlier))
+    BodyPrior prior = make_prior(sensors);
+    if (!are_values_valid(sensors) || !is_valid_prior(prior) || !are_times_valid(earlier))
       return make_fix_without_pose(FixStatus::not_finite, 0);
     FrameObservations frame;
-    FixStatus status = make_observations(detections, 0, sensors, frame);
+    FixStatus status = make_observations(detections, 0, prior, frame);
     const int unknown_lamps = frame.unknown_lamps;
     frame.num_current = frame.size;
     for (const EarlierFrame& before : earlier) {
       if (status != FixStatus::ok || frame.num_current < 2) break;
-      status = make_observations(before.detections, -before.before_s, sensors, frame);
+      status = make_observations(before.detections, -before.before_s, prior, frame);
     }
     if (status != FixStatus::ok) return make_fix_without_pose(status, unknown_lamps);
-    if (frame.size == 0 || (frame.size == 1 && !sensors.height_and_yaw))
+    if (frame.size == 1) set_height_and_yaw_of_camera(sensors, prior);
+    if (frame.size == 0 || (frame.size == 1 && std::isinf(prior.max_variance(kBodyZ, 2))))
       return make_fix_without_pose(FixStatus::too_few_lamps, unknown_lamps);
-    if (sensors.motion && may_camera_move_during_readout(*sensors.motion) && !row_clock_)
+    const BodyMotion& motion = prior.mean.motion;
+    const bool may_move = prior.is_motion_estimated() || !motion.velocity_m_per_s.isZero(0) ||
+                          motion.yaw_rate_rad_per_s != 0;
+    if (may_move && !row_clock_)
       return make_fix_without_pose(FixStatus::row_time_unknown, unknown_lamps);
-    const BodyPrior prior = make_prior(sensors, frame.size == 1);
     const BodyProblem problem{mount_.position_in_robot_m, prior};
     BodySolution solution = estimate_body_state_robust(frame, problem, max_residual_fraction_);
     if (solution.status == FixStatus::ok) reject_contradicting_lamps(frame, problem, solution);
-    if (solution.status != FixStatus::ok)
-      return make_fix_without_pose(solution.status, unknown_lamps);
-    Fix fix = make_consistent_fix(frame, problem, solution.fix,
-                                  has_body_estimate(sensors) && frame.num_current > 1);
+    Fix fix = solution.status == FixStatus::ok ? make_consistent_fix(frame, problem, solution.fix)
+                                               : make_fix_with_candidates(solution);
     fix.time_s = sensors.time_s;
     fix.unknown_lamps = unknown_lamps;
     return fix;
+  }
+
+  Eigen::Matrix3d compute_level_from_camera(const Inclination& inclination) const {
+    const Eigen::Matrix3d level_from_body = level_rotation_from_inclination(inclination);
+    return level_rotation_from_zenith((level_from_body * body_from_camera_).inverse().col(2));
+  }
+
+  LampProjection project_lamp(int id, const BodyState& state) const {
+    constexpr double unknown = std::numeric_limits<double>::quiet_NaN();
+    const LampProjection none{Eigen::Vector2d::Constant(unknown),
+                              LampProjection::Jacobian::Constant(unknown)};
+    constexpr int max_iterations = 20;
+    constexpr double tolerance_s = 1e-12;
+    if (!has_lamp(id)) return none;
+    const Lamp& lamp_in_map = lamps_[find_lamp_index_by_id(id)];
+    BodyState local = state;
+    local.pose.position_m -= origin_m_;
+    const EvaluatedState body(local);
+    const Eigen::Matrix3d camera_from_body = body_from_camera_.inverse();
+    double time_s = 0;
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
+      const auto lamp =
+          linearize_lamp_position(lamp_in_map.position_m, time_s, body, mount_.position_in_robot_m);
+      const auto seen = lens_.project_point_with_jacobians(camera_from_body * lamp.q);
+      if (!seen) return none;
+      const double read_s = row_clock_ ? row_clock_->compute_pixel_readout_time_s(seen->pixel) : 0;
+      if (!(std::abs(read_s - time_s) > tolerance_s)) {
+        // The readout time t depends on the pixel p: dp = d_pixel_d_q (J dx + dq/dt dt).
+        const Eigen::Matrix<double, 2, 3> d_pixel_d_q = seen->d_pixel_d_point * camera_from_body;
+        Eigen::Matrix2d implicit = Eigen::Matrix2d::Identity();
+        if (row_clock_) {
+          implicit -= d_pixel_d_q * lamp.velocity_m_per_s * row_clock_->d_time_d_pixel();
+        }
+        return {seen->pixel, implicit.inverse() * d_pixel_d_q * lamp.jacobian};
+      }
+      time_s = read_s;
+    }
+    return none;
+  }
+
+  bool has_lamp(int id) const {
+    const std::size_t index = find_lamp_index_by_id(id);
+    return index < lamps_.size() && lamps_[index].id == id;
   }
 
   int num_lamps_moved_since_calibration() const {
@@ -254,34 +263,43 @@ class Positioner::Impl {
   }
 
  private:
-  /// Returns the prior of the state. A single lamp requires height and yaw of the camera.
-  BodyPrior make_prior(const Sensors& sensors, bool is_single_lamp) const {
-    const KnownMotion motion = sensors.motion.value_or(KnownMotion());
-    BodyPrior prior{.mean = {motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
-                             sensors.inclination.value_or(Inclination{0, 0})},
-                    .velocity_sd_m_per_s = motion.velocity_sd_m_per_s,
-                    .yaw_rate_sd_rad_per_s = motion.yaw_rate_sd_rad_per_s,
-                    .inclination_sd_rad = sensors.inclination_sigma_rad,
-                    .height = sensors.height};
-    if (is_single_lamp) {
-      const HeightAndYaw& known = *sensors.height_and_yaw;
-      prior.height = KnownHeight{known.z_m, known.z_sd_m};
-      prior.height_point_m = mount_.position_in_robot_m;
-      prior.yaw = KnownYaw{known.yaw_rad - mount_.yaw_in_robot_rad, known.yaw_sd_rad};
+  /// Returns the prior of the state from the readings; without height and yaw of the camera.
+  BodyPrior make_prior(const Sensors& sensors) const {
+    BodyPrior prior;
+    if (sensors.prior) {
+      static_cast<StatePrior&>(prior) = *sensors.prior;
+    } else {
+      const KnownMotion motion = sensors.motion.value_or(KnownMotion());
+      prior.mean.motion = {motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
+                           sensors.inclination.value_or(Inclination{0, 0})};
+      prior.set_sd(kBodyVelocity, motion.velocity_sd_m_per_s);
+      prior.set_sd(kBodyYawRate, motion.yaw_rate_sd_rad_per_s);
+      prior.set_sd(kBodyRoll, sensors.inclination_sigma_rad);
+      if (const auto& height = sensors.height) {
+        prior.mean.pose.position_m.z() = height->z_m;
+        prior.set_sd(kBodyZ, height->sd_m);
+      }
     }
-    if (prior.height) prior.height->z_m -= origin_m_.z();
+    prior.mean.pose.position_m -= origin_m_;
     return prior;
+  }
+
+  void set_height_and_yaw_of_camera(const Sensors& sensors, BodyPrior& prior) const {
+    if (!sensors.height_and_yaw) return;
+    const HeightAndYaw& known = *sensors.height_and_yaw;
+    prior.mean.pose = {{0, 0, known.z_m - origin_m_.z()}, known.yaw_rad - mount_.yaw_in_robot_rad};
+    prior.height_point_m = mount_.position_in_robot_m;
+    prior.set_sd(kBodyZ, known.z_sd_m);
+    prior.set_sd(kBodyYaw, known.yaw_sd_rad);
   }
 
   /// Adds the detections of lamps of the map to the frame. `time_s` is the time of the detections.
   FixStatus make_observations(std::span<const Detection> detections, double time_s,
-                              const Sensors& sensors, FrameObservations& frame) const {
+                              const BodyPrior& prior, FrameObservations& frame) const {
     // With known roll and pitch, detections without sigma_px have equal weights in the level plane.
     std::optional<Eigen::Matrix3d> level_from_body;
-    if (sensors.inclination_sigma_rad == 0) {
-      level_from_body =
-          level_rotation_from_inclination(sensors.inclination.value_or(Inclination{0, 0}));
-    }
+    if (!prior.is_tilt_estimated())
+      level_from_body = level_rotation_from_inclination(prior.mean.motion.inclination);
     const auto ids_begin = frame.ids.begin() + static_cast<std::ptrdiff_t>(frame.size);
     for (const Detection& detection : detections) {
       const auto lamp = std::ranges::lower_bound(lamps_, detection.lamp, {}, &Lamp::id);
@@ -409,30 +427,29 @@ class Positioner::Impl {
   /// includes an unknown tilt or motion that explains them, or the noise is scaled until it does.
   /// Chi-squared stays that of the stated noise.
   Fix make_consistent_fix(FrameObservations& frame, const BodyProblem& problem,
-                          const BodyFix& solution, bool has_body) const {
-    Fix fix = make_fix(frame, problem, solution, BodyCovariance::Zero(), has_body);
+                          const BodyFix& solution) const {
+    Fix fix = make_fix(frame, problem, solution, BodyCovariance::Zero());
     // Noise that is not stated is no contradiction.
     const double scale = frame.noise_is_stated ? estimate_noise_scale_of_contradiction(fix) : 1;
     if (scale > 1) {
       if (const auto covariance = find_covariance_with_tilt_or_motion(frame, problem, solution)) {
-        fix = make_fix(frame, problem, solution, *covariance - solution.covariance, has_body);
+        fix = make_fix(frame, problem, solution, *covariance - solution.covariance);
       } else {
-        fix = make_fix_with_scaled_noise(frame, problem, solution, scale, has_body);
+        fix = make_fix_with_scaled_noise(frame, problem, solution, scale);
       }
     }
-    if (!computes_common_chi_squared_) fix.common_chi_squared = 0;
     return fix;
   }
 
   Fix make_fix_with_scaled_noise(FrameObservations& frame, const BodyProblem& problem,
-                                 const BodyFix& solution, double scale, bool has_body) const {
+                                 const BodyFix& solution, double scale) const {
     for (std::size_t i = 0; i < frame.size; ++i) {
       frame.sightings[i].whitened_pixel_from_ray /= scale;
       frame.sightings[i].sigma_px *= scale;
     }
     const auto again = estimate_body_state(frame.observations_span(), problem, solution.state);
     if (!again) return make_fix_without_pose(FixStatus::inconsistent, 0);
-    Fix fix = make_fix(frame, problem, *again, BodyCovariance::Zero(), has_body);
+    Fix fix = make_fix(frame, problem, *again, BodyCovariance::Zero());
     fix.chi_squared *= scale * scale;
     fix.common_chi_squared *= scale * scale;
     return fix;
@@ -447,9 +464,9 @@ class Positioner::Impl {
     constexpr double tilt_sd_rad = 0.15, speed_sd_m_per_s = 1.5, yaw_rate_sd_rad_per_s = 1;
     const BodyPrior& known = problem.prior;
     BodyPrior tilted = known, moving = known;
-    tilted.inclination_sd_rad = tilt_sd_rad;
-    moving.velocity_sd_m_per_s = speed_sd_m_per_s;
-    moving.yaw_rate_sd_rad_per_s = yaw_rate_sd_rad_per_s;
+    tilted.set_sd(kBodyRoll, tilt_sd_rad);
+    moving.set_sd(kBodyVelocity, speed_sd_m_per_s);
+    moving.set_sd(kBodyYawRate, yaw_rate_sd_rad_per_s);
     std::optional<BodyCovariance> found;
     const auto add = [&](const BodyPrior& prior) {
       const auto other =
@@ -462,7 +479,7 @@ class Positioner::Impl {
           other->covariance + BodyCovariance(difference * difference.transpose());
       found = found ? BodyCovariance(*found + covariance) : covariance;
     };
-    if (known.inclination_sd_rad == 0) add(tilted);
+    if (!known.is_tilt_estimated()) add(tilted);
     if (!known.is_motion_estimated() && row_clock_) add(moving);
     if (!found) return found;
     // States given as exact remain so in the result.
@@ -474,14 +491,22 @@ class Positioner::Impl {
     return found;
   }
 
+  Fix make_fix_with_candidates(const BodySolution& solution) const {
+    Fix fix = make_fix_without_pose(solution.status, 0);
+    if (solution.status != FixStatus::ambiguous) return fix;
+    fix.num_candidates = solution.num_candidates;
+    fix.candidates = solution.candidates;
+    for (FixCandidate& candidate : fix.candidates) candidate.state.pose.position_m += origin_m_;
+    return fix;
+  }
+
   /// `excess` is added to the covariance as an error that is not noise.
   Fix make_fix(const FrameObservations& frame, const BodyProblem& problem, BodyFix solution,
-               const BodyCovariance& excess, bool has_body) const {
+               const BodyCovariance& excess) const {
     const BodyCovariance common = compute_common_covariance(frame, problem, solution);
     Fix fix;
     fix.status = FixStatus::ok;
-    const bool is_contradiction = solution.pixels_chi_squared > solution.redundancy;
-    if ((computes_common_chi_squared_ || is_contradiction) && common_.are_any_errors_known() &&
+    if (solution.pixels_chi_squared > solution.redundancy && common_.are_any_errors_known() &&
         solution.redundancy > kMinRedundancy) {
       std::array<Matrix2, max_lamps> covariances;
       compute_residual_covariances(frame, problem, solution, {covariances.data(), frame.size});
@@ -492,15 +517,14 @@ class Positioner::Impl {
     if (!frame.is_weighted_by_noise) convert_covariance_to_image_noise(frame, problem, solution);
     fix.redundancy = solution.redundancy > kMinRedundancy ? solution.redundancy : 0;
     fix.chi_squared = solution.pixels_chi_squared;
-    fix.noise_covariance = solution.covariance.topLeftCorner<4, 4>();
+    fix.state = solution.state;
+    fix.noise_covariance = solution.covariance;
     if (frame.size == 1) {
       fix.noise_covariance.topLeftCorner<2, 2>() +=
           compute_second_order_covariance_of_one_lamp(frame.sightings[0], problem, solution);
     }
-    fix.estimate = {solution.state.pose,
-                    fix.noise_covariance + (common + excess).topLeftCorner<4, 4>()};
-    if (has_body) fix.body = rotate_estimate_to_world(solution, common + excess);
-    fix.estimate.pose.position_m += origin_m_;
+    fix.covariance = fix.noise_covariance + common + excess;
+    fix.state.pose.position_m += origin_m_;
     fix.residual_px = solution.residual_px;
     fix.lamps = static_cast<int>(frame.num_current);
     fix.sightings = static_cast<int>(frame.size);
@@ -522,7 +546,6 @@ class Positioner::Impl {
   Eigen::Matrix3d body_from_base_, body_from_camera_;
   double max_residual_fraction_;
   double unstated_sigma_px_;
-  bool computes_common_chi_squared_;
   /// std::nullopt if the calibration lacks row time or readout direction.
   std::optional<RowClock> row_clock_;
 };
@@ -543,6 +566,29 @@ Fix Positioner::compute_position_fix(std::span<const Detection> detections, cons
   const bool below = impl_->are_lamps_below_camera();
   return turn_over_if(
       below, impl_->compute_position_fix(detections, turn_over_if(below, sensors), earlier));
+}
+
+Eigen::Matrix3d Positioner::compute_level_from_camera(const Inclination& inclination) const {
+  return impl_->compute_level_from_camera(
+      turn_over_if(impl_->are_lamps_below_camera(), inclination));
+}
+
+LampProjection Positioner::project_lamp(int lamp, const BodyState& state) const noexcept {
+  const bool below = impl_->are_lamps_below_camera();
+  return turn_over_if(below, impl_->project_lamp(lamp, turn_over_if(below, state)));
+}
+
+DetectionResidual Positioner::compute_detection_residual(const Detection& detection,
+                                                         const Fix& fix) const noexcept {
+  const auto rejected = static_cast<std::size_t>(fix.rejected_lamps);
+  const auto listed =
+      std::span(fix.rejected_ids).first(std::min(rejected, fix.rejected_ids.size()));
+  const DetectionUse use = !impl_->has_lamp(detection.lamp) ? DetectionUse::not_in_map
+                           : std::ranges::find(listed, detection.lamp) != listed.end()
+                               ? DetectionUse::rejected
+                               : DetectionUse::used;
+  const LampProjection predicted = project_lamp(detection.lamp, fix.state);
+  return {use, predicted, detection.pixel - predicted.pixel};
 }
 
 int Positioner::num_lamps_moved_since_calibration() const noexcept {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <memory>
 #include <optional>
@@ -43,8 +44,6 @@ struct PositionerOptions {
   /// closed forms. Errors of lens, tilt and map affect these weights less than weights in the
   /// distorted image.
   double unstated_sigma_px = 1;
-  /// True if Fix::common_chi_squared is computed.
-  bool computes_common_chi_squared = false;
 };
 
 /// Motion of a robot, or, without a mount, of a camera, while an image is read. Normally
@@ -80,8 +79,21 @@ struct Sensors {
   std::optional<KnownMotion> motion = {};
   /// Height of the robot's center, or, without a mount, of the camera. Not used for a single lamp.
   std::optional<KnownHeight> height = {};
+  /// Prior of the state with correlations, as of a filter's prediction, for any number of lamps;
+  /// one lamp requires its height and yaw. In place of the readings above.
+  std::optional<StatePrior> prior = {};
   /// Time of the capture in any time scale, copied to Fix::time_s.
   std::optional<double> time_s = {};
+
+  /// Returns the reading of the inclination, or the mean of the prior.
+  std::optional<Inclination> known_inclination() const {
+    return prior ? std::optional(prior->mean.motion.inclination) : inclination;
+  }
+  /// Returns the standard deviation of roll and pitch; 0: exact.
+  double tilt_sd_rad() const {
+    return prior ? std::sqrt(prior->covariance.diagonal().tail<2>().maxCoeff())
+                 : inclination_sigma_rad;
+  }
 };
 
 /// Detections of an earlier frame of the same body, whose velocity, yaw rate, roll and pitch are
@@ -90,6 +102,27 @@ struct EarlierFrame {
   std::span<const Detection> detections;
   /// Time from the earlier frame to the frame of the fix. Positive, and different for each frame.
   double before_s;
+};
+
+/// Pixel of a lamp's center and its derivatives with respect to the states (BodyIndex).
+struct LampProjection {
+  using Jacobian = Eigen::Matrix<double, 2, kBodyStates, Eigen::DontAlign>;
+
+  Eigen::Vector2d pixel;
+  Jacobian jacobian;
+};
+
+/// Use of a detection in a fix: `rejected` because the others contradict it, `not_in_map` because
+/// the map lacks the lamp.
+enum class DetectionUse { used, rejected, not_in_map };
+
+/// Comparison of a detection with a fix.
+struct DetectionResidual {
+  DetectionUse use;
+  /// Projection of the lamp. NaN if the map lacks the lamp or the lens does not image it.
+  LampProjection predicted;
+  /// Detected minus predicted pixel.
+  Eigen::Vector2d residual_px;
 };
 
 /// Estimates positions from identified lamps in images. Combines calibration and lamp map once,
@@ -118,6 +151,18 @@ class Positioner {
   /// assumed at rest.
   Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
                            std::span<const EarlierFrame> earlier) const noexcept;
+
+  /// Computes the rotation level_from_camera for a detector from roll and pitch, with an arbitrary
+  /// yaw.
+  Eigen::Matrix3d compute_level_from_camera(const Inclination& inclination) const;
+  /// Computes the pixel of a lamp of the map at a state, and its derivatives. If the body moves,
+  /// the pixel is where the readout reaches the lamp. NaN if the map lacks the lamp, or if the lens
+  /// does not image it. Does not allocate memory.
+  LampProjection project_lamp(int lamp, const BodyState& state) const noexcept;
+  /// Compares a detection of the frame of a fix with the state of the fix. `use` is exact for the
+  /// rejected lamps that the fix lists.
+  DetectionResidual compute_detection_residual(const Detection& detection,
+                                               const Fix& fix) const noexcept;
 
   /// Returns the number of lamps of the adjustment that the map has at another position. The
   /// reported covariances do not include their errors (CommonErrors).

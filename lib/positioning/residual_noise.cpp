@@ -38,8 +38,6 @@ ResidualSums sum_squared_residuals_of_fixes(std::span<const Fix> fixes) {
   for (const Fix& fix : fixes) {
     if (!has_redundancy(fix) || fix.chi_squared > max_reduced * fix.redundancy) continue;
     sums.squares_px2 += fix.sightings * fix.residual_px * fix.residual_px;
-    sums.chi_squared += fix.chi_squared;
-    sums.common_chi_squared += fix.common_chi_squared;
     sums.degrees_of_freedom += fix.redundancy;
   }
   return sums;
@@ -49,21 +47,6 @@ std::optional<double> estimate_pixel_noise_px(const ResidualSums& sums) {
   if (!(sums.degrees_of_freedom > 0)) return std::nullopt;
   return std::clamp(std::sqrt(sums.squares_px2 / sums.degrees_of_freedom), kMinSigma_px,
                     kMaxSigma_px);
-}
-
-std::optional<double> estimate_noise_scale_factor(const ResidualSums& sums) {
-  if (!(sums.degrees_of_freedom > 0)) return std::nullopt;
-  constexpr double min_fraction = 0.25;
-  const double noise_chi_squared =
-      std::max(sums.chi_squared - sums.common_chi_squared, min_fraction * sums.chi_squared);
-  return std::sqrt(noise_chi_squared / sums.degrees_of_freedom);
-}
-
-double estimate_birge_ratio(const ResidualSums& sums) {
-  constexpr double min_degrees_of_freedom = 12;
-  if (sums.degrees_of_freedom < min_degrees_of_freedom) return 1;
-  const double noise_chi_squared = sums.chi_squared - 2 * sums.common_chi_squared;
-  return std::sqrt(std::max(1.0, noise_chi_squared / sums.degrees_of_freedom));
 }
 
 double compute_chi_squared_limit(double degrees_of_freedom) {

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "fix.h"
+
 /// Data that a robot has from other sources than images.
 namespace vlp {
 
@@ -29,6 +31,14 @@ struct KnownHeight {
   double z_m;
   /// Standard deviation of z_m. Positive.
   double sd_m;
+};
+
+/// Gaussian prior of the state of the robot, or, without a mount, of the camera.
+struct StatePrior {
+  BodyState mean = {};
+  /// Covariance (BodyIndex). An infinite variance of X, Y, Z or yaw states nothing. Variance 0 is
+  /// exact. Covariances with such states are ignored.
+  BodyCovariance covariance = BodyCovariance::Zero();
 };
 
 }  // namespace vlp

@@ -17,6 +17,10 @@ struct RowClock {
   double compute_pixel_readout_time_s(const Eigen::Vector2d& pixel) const {
     return row_time_s * ((readout == Readout::rows ? pixel.y() : pixel.x()) - middle_row);
   }
+  Eigen::RowVector2d d_time_d_pixel() const {
+    return row_time_s *
+           (readout == Readout::rows ? Eigen::RowVector2d::UnitY() : Eigen::RowVector2d::UnitX());
+  }
 };
 
 /// Returns the row clock of a camera, which gives the readout time of each pixel. Time 0 is the

@@ -175,7 +175,6 @@ ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 
       FreePose pose;
       pose.camera_from_world = seen_frame * world_frame.transpose();
       pose.position_m = points_m[0] - pose.camera_from_world.transpose() * seen[0];
-      pose.is_exact = discriminant >= 0;
       if (!pose.position_m.allFinite()) continue;
       found.poses[static_cast<std::size_t>(found.count++)] = pose;
     }

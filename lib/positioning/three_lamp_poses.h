@@ -11,8 +11,6 @@ namespace vlp {
 struct FreePose {
   Eigen::Matrix3d camera_from_world;
   Eigen::Vector3d position_m;
-  /// False for the point between two solutions that have just vanished.
-  bool is_exact = true;
 };
 
 /// Poses of a camera with any rotation that explain three lamps: `count` of them, 0 to 4, at the

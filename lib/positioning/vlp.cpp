@@ -16,6 +16,7 @@
 
 #include "lamps/lamp_detector.h"
 #include "lamps/signal/lamp_map_check.h"
+#include "positioning/image_fix.h"
 #include "positioning/positioner.h"
 #include "rig/input_error.h"
 #include "rig/lamp_map_file.h"
@@ -54,6 +55,24 @@ PositionerOptions convert_options(const vlp_options& options) {
   return result;
 }
 
+static_assert(VLP_STATES == kBodyStates && sizeof(vlp_state) == kBodyStates * sizeof(double));
+
+vlp_state convert_state(const BodyState& state) {
+  const auto& [pose, motion] = state;
+  const Eigen::Vector3d& at = pose.position_m;
+  const Eigen::Vector2d& velocity = motion.velocity_m_per_s;
+  return {{at.x(), at.y(), at.z()},     pose.yaw_rad,
+          {velocity.x(), velocity.y()}, motion.yaw_rate_rad_per_s,
+          motion.inclination.roll_rad,  motion.inclination.pitch_rad};
+}
+
+BodyState convert_state(const vlp_state& state) {
+  return {{Eigen::Vector3d(state.position_m), state.yaw_rad},
+          {Eigen::Vector2d(state.velocity_m_per_s),
+           state.yaw_rate_rad_per_s,
+           {state.roll_rad, state.pitch_rad}}};
+}
+
 Sensors convert_sensors(const vlp_sensors& sensors) {
   Sensors result;
   if (sensors.has_inclination != 0) {
@@ -70,66 +89,34 @@ Sensors convert_sensors(const vlp_sensors& sensors) {
                     sensors.velocity_sd_m_per_s, sensors.yaw_rate_sd_rad_per_s};
   }
   if (sensors.has_height != 0) result.height = KnownHeight{sensors.z_m, sensors.z_sd_m};
+  if (sensors.prior != nullptr) {
+    using Rows = Eigen::Matrix<double, kBodyStates, kBodyStates, Eigen::RowMajor>;
+    result.prior = StatePrior{convert_state(sensors.prior->mean),
+                              Eigen::Map<const Rows>(sensors.prior->covariance)};
+  }
   return result;
 }
 
-using Covariance6 = Eigen::Map<Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>;
-
-/// Combines (X, Y, Z, yaw) of the pose's covariance with roll and pitch of the body's covariance.
-void fill_covariance(const Matrix4& of_pose, const BodyCovariance& of_body, double* rows) {
-  constexpr std::array<int, 6> body = {0, 1, 2, kBodyRoll, kBodyPitch, kBodyYaw};
-  Covariance6 covariance(rows);
-  for (int i = 0; i < 6; ++i) {
-    for (int k = 0; k < 6; ++k) {
-      const int from_i = body[static_cast<std::size_t>(i)];
-      const int from_k = body[static_cast<std::size_t>(k)];
-      const bool pose = from_i <= kBodyYaw && from_k <= kBodyYaw;
-      covariance(i, k) = pose ? of_pose(from_i, from_k) : of_body(from_i, from_k);
-    }
-  }
+template <typename Matrix>
+void copy_by_rows(const Matrix& from, double* rows) {
+  constexpr int num_rows = Matrix::RowsAtCompileTime;
+  Eigen::Map<Eigen::Matrix<double, num_rows, kBodyStates, Eigen::RowMajor>>{rows} = from;
 }
 
-/// Returns the given motion, roll and pitch of a body that was not estimated.
-BodyEstimate get_given_body_estimate(const Sensors& sensors, double yaw_rad) {
-  BodyEstimate body;
-  if (sensors.inclination) body.inclination = *sensors.inclination;
-  const double variance = sensors.inclination_sigma_rad * sensors.inclination_sigma_rad;
-  body.covariance(kBodyRoll, kBodyRoll) = body.covariance(kBodyPitch, kBodyPitch) = variance;
-  if (sensors.motion) {
-    const Eigen::Vector2d& velocity = sensors.motion->velocity_m_per_s;
-    const double c = std::cos(yaw_rad), s = std::sin(yaw_rad);
-    body.velocity_m_per_s = {c * velocity.x() - s * velocity.y(),
-                             s * velocity.x() + c * velocity.y()};
-    body.yaw_rate_rad_per_s = sensors.motion->yaw_rate_rad_per_s;
-    const double velocity_variance =
-        sensors.motion->velocity_sd_m_per_s * sensors.motion->velocity_sd_m_per_s;
-    body.covariance.block<2, 2>(kBodyVelocity, kBodyVelocity)
-        .diagonal()
-        .setConstant(velocity_variance);
-    body.covariance(kBodyYawRate, kBodyYawRate) =
-        sensors.motion->yaw_rate_sd_rad_per_s * sensors.motion->yaw_rate_sd_rad_per_s;
-  }
-  body.noise_covariance = body.covariance;
-  return body;
-}
-
-void copy_fix_to_c_struct(const Fix& from, const Sensors& sensors, vlp_fix& fix) {
+void copy_fix_to_c_struct(const Fix& from, vlp_fix& fix) {
   fix.status = static_cast<std::int32_t>(from.status);
   fix.unknown_lamps = from.unknown_lamps;
+  fix.num_candidates = from.num_candidates;
+  for (std::size_t i = 0; std::cmp_less(i, from.num_candidates); ++i) {
+    fix.candidates[i] = {convert_state(from.candidates[i].state), from.candidates[i].likelihood};
+  }
   if (!from.has_succeeded()) return;
-  const auto& [pose, covariance] = from.estimate;
-  const BodyEstimate body = from.body ? *from.body : get_given_body_estimate(sensors, pose.yaw_rad);
-  std::copy_n(pose.position_m.data(), 3, fix.position_m);
-  fix.roll_rad = body.inclination.roll_rad;
-  fix.pitch_rad = body.inclination.pitch_rad;
-  fix.yaw_rad = pose.yaw_rad;
-  fill_covariance(covariance, body.covariance, fix.covariance);
-  fill_covariance(from.noise_covariance, body.noise_covariance, fix.noise_covariance);
-  std::copy_n(body.velocity_m_per_s.data(), 2, fix.velocity_m_per_s);
-  fix.yaw_rate_rad_per_s = body.yaw_rate_rad_per_s;
-  Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(fix.velocity_covariance) =
-      body.covariance.block<3, 3>(kBodyVelocity, kBodyVelocity);
+  fix.state = convert_state(from.state);
+  copy_by_rows(from.covariance, fix.covariance);
+  copy_by_rows(from.noise_covariance, fix.noise_covariance);
   fix.residual_px = from.residual_px;
+  fix.chi_squared = from.chi_squared;
+  fix.redundancy = from.redundancy;
   fix.lamps = from.lamps;
   fix.rejected_lamps = from.rejected_lamps;
   std::copy(from.rejected_ids.begin(), from.rejected_ids.end(), fix.rejected_ids);
@@ -185,6 +172,38 @@ class DetectionBuffer {
   std::size_t size_ = 0;
 };
 
+/// Writes the detections that `detect` returns. Returns an error if there are more than `capacity`.
+template <typename Detect>
+std::int32_t detect_in_image(const vlp_positioner* positioner, const vlp_image* image,
+                             vlp_detection* detections, std::size_t capacity, std::size_t* count,
+                             const Detect& detect) {
+  if (count != nullptr) *count = 0;
+  if (positioner == nullptr || image == nullptr || count == nullptr ||
+      (detections == nullptr && capacity > 0)) {
+    return set_error_and_return_code(VLP_BAD_ARGUMENT, "a pointer is null");
+  }
+  if (!positioner->detector) {
+    return set_error_and_return_code(
+        VLP_ROW_TIME_UNKNOWN,
+        "the calibration has no row_time_s, which is needed to identify lamps");
+  }
+  if (!positioner->room_error.empty())
+    return set_error_and_return_code(VLP_BAD_FILE, positioner->room_error);
+  try {
+    const std::vector<Detection> seen = detect(*positioner->detector, make_image_view(*image));
+    for (std::size_t i = 0; i < std::min(seen.size(), capacity); ++i) {
+      detections[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(),
+                       seen[i].sigma_px.value_or(0)};
+    }
+    *count = seen.size();
+    if (seen.size() <= capacity) return VLP_OK;
+    return set_error_and_return_code(VLP_TOO_SMALL,
+                                     "the image shows " + std::to_string(seen.size()) + " lamps");
+  } catch (...) {
+    return set_error_from_exception();
+  }
+}
+
 }  // namespace
 }  // namespace vlp
 
@@ -227,31 +246,28 @@ void vlp_close(vlp_positioner* positioner) { delete positioner; }
 int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
                    vlp_detection* detections, size_t capacity, size_t* count) {
   using namespace vlp;
-  if (count != nullptr) *count = 0;
-  if (positioner == nullptr || image == nullptr || count == nullptr ||
-      (detections == nullptr && capacity > 0)) {
-    return set_error_and_return_code(VLP_BAD_ARGUMENT, "a pointer is null");
-  }
-  if (!positioner->detector) {
-    return set_error_and_return_code(
-        VLP_ROW_TIME_UNKNOWN,
-        "the calibration has no row_time_s, which is needed to identify lamps");
-  }
-  if (!positioner->room_error.empty())
-    return set_error_and_return_code(VLP_BAD_FILE, positioner->room_error);
-  try {
-    const auto seen = positioner->detector->detect_lamps(make_image_view(*image));
-    for (std::size_t i = 0; i < std::min(seen.size(), capacity); ++i) {
-      detections[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(),
-                       seen[i].sigma_px.value_or(0)};
-    }
-    *count = seen.size();
-    if (seen.size() <= capacity) return VLP_OK;
-    return set_error_and_return_code(VLP_TOO_SMALL,
-                                     "the image shows " + std::to_string(seen.size()) + " lamps");
-  } catch (...) {
-    return set_error_from_exception();
-  }
+  return detect_in_image(
+      positioner, image, detections, capacity, count,
+      [](const auto& detector, const ImageView& view) { return detector.detect_lamps(view); });
+}
+
+int32_t vlp_locate_image(const vlp_positioner* positioner, const vlp_image* image,
+                         const vlp_sensors* sensors, vlp_detection* detections, size_t capacity,
+                         size_t* count, vlp_fix* fix) {
+  using namespace vlp;
+  if (fix == nullptr) return set_error_and_return_code(VLP_BAD_ARGUMENT, "a pointer is null");
+  *fix = {};
+  if (sensors != nullptr) fix->stamp = sensors->stamp;
+  const std::int32_t code = detect_in_image(
+      positioner, image, detections, capacity, count,
+      [&](const auto& detector, const ImageView& view) {
+        const Sensors known = sensors != nullptr ? convert_sensors(*sensors) : Sensors();
+        ImageFix found = locate_camera_in_image(positioner->positioner, detector, view, known);
+        copy_fix_to_c_struct(found.fix, *fix);
+        return std::move(found.detections);
+      });
+  if (code != VLP_OK) fix->status = code;
+  return fix->status;
 }
 
 int32_t vlp_locate(const vlp_positioner* positioner, const vlp_detection* detections, size_t count,
@@ -287,8 +303,46 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
   const Positioner& with = positioner->positioner;
   copy_fix_to_c_struct(frames > 0 ? with.compute_position_fix(frame, known, {before.data(), frames})
                                   : with.compute_position_fix(frame, known),
-                       known, *fix);
+                       *fix);
   return fix->status;
+}
+
+int32_t vlp_project(const vlp_positioner* positioner, int32_t lamp, const vlp_state* state,
+                    double* pixel, double* jacobian) {
+  using namespace vlp;
+  if (positioner == nullptr || state == nullptr || pixel == nullptr) return VLP_BAD_ARGUMENT;
+  Fix fix;
+  fix.state = convert_state(*state);
+  const auto seen = positioner->positioner.compute_detection_residual({lamp, {0, 0}, {}}, fix);
+  if (seen.use == DetectionUse::not_in_map) return VLP_BAD_ARGUMENT;
+  if (!seen.predicted.pixel.allFinite()) return VLP_OUTSIDE_LENS;
+  std::copy_n(seen.predicted.pixel.data(), 2, pixel);
+  if (jacobian != nullptr) copy_by_rows(seen.predicted.jacobian, jacobian);
+  return VLP_OK;
+}
+
+int32_t vlp_compute_residuals(const vlp_positioner* positioner, const vlp_detection* detections,
+                              size_t count, const vlp_fix* fix, vlp_residual* residuals) {
+  using namespace vlp;
+  if (positioner == nullptr || fix == nullptr || fix->status != VLP_OK ||
+      ((detections == nullptr || residuals == nullptr) && count > 0)) {
+    return VLP_BAD_ARGUMENT;
+  }
+  Fix of;
+  of.state = convert_state(fix->state);
+  of.rejected_lamps = fix->rejected_lamps;
+  std::copy_n(fix->rejected_ids, of.rejected_ids.size(), of.rejected_ids.begin());
+  for (std::size_t i = 0; i < count; ++i) {
+    const vlp_detection& detection = detections[i];
+    const auto [use, predicted, residual_px] = positioner->positioner.compute_detection_residual(
+        {detection.lamp, {detection.u_px, detection.v_px}, {}}, of);
+    vlp_residual& to = residuals[i];
+    to.use = static_cast<std::int32_t>(use);
+    std::copy_n(predicted.pixel.data(), 2, to.predicted_px);
+    std::copy_n(residual_px.data(), 2, to.residual_px);
+    copy_by_rows(predicted.jacobian, to.jacobian);
+  }
+  return VLP_OK;
 }
 
 const char* vlp_describe_status(int32_t code) {

@@ -25,7 +25,7 @@ enum {
   VLP_TOO_FEW_LAMPS = 1,     /* fewer than two lamps of the map */
   VLP_TOO_MANY_LAMPS = 2,    /* more than VLP_MAX_LAMPS */
   VLP_DUPLICATE_LAMP = 3,    /* one id twice in a frame */
-  VLP_NOT_FINITE = 4,        /* a value is not finite, or a sigma or sd is out of range */
+  VLP_NOT_FINITE = 4,        /* a value is not finite, or a sigma, sd or prior is out of range */
   VLP_OUTSIDE_LENS = 5,      /* a pixel that no ray through the lens reaches */
   VLP_LAMP_BELOW_CAMERA = 6, /* a lamp would have to be at or below the camera's height */
   VLP_DEGENERATE = 7,        /* the lamps are too close together in the image, or fit no pose */
@@ -80,6 +80,30 @@ typedef struct vlp_detection {
   double sigma_px;
 } vlp_detection;
 
+/* State of the robot's center or, without a mount, of the camera, at the middle of the exposure of
+ * the image's middle row. Covariances and derivatives have its nine numbers in this order. */
+typedef struct vlp_state {
+  double position_m[3];
+  double yaw_rad;
+  /* Along the axes of the level frame of the robot or, without a mount, of the camera. */
+  double velocity_m_per_s[2];
+  double yaw_rate_rad_per_s;
+  /* Level is 0, as is a camera that looks straight down if the map states lamps_below_camera
+   * (rig/lamp_map.h). */
+  double roll_rad, pitch_rad;
+} vlp_state;
+
+/* Number of states in a covariance. */
+#define VLP_STATES 9
+
+/* Gaussian prior of the state: StatePrior of positioning/robot.h. */
+typedef struct vlp_prior {
+  vlp_state mean;
+  /* Covariance by rows. An infinite variance of x, y, z or yaw states nothing. Variance 0 is exact.
+   * Covariances with such states are ignored. */
+  double covariance[VLP_STATES * VLP_STATES];
+} vlp_prior;
+
 /* Sensor readings of the robot for a frame: Sensors of positioning/positioner.h. */
 typedef struct vlp_sensors {
   /* Any number, such as the time of the middle of the exposure of the image's middle row in
@@ -105,6 +129,8 @@ typedef struct vlp_sensors {
   /* Height of the robot's center or, without a mount, of the camera. z_sd_m is positive. */
   int32_t has_height;
   double z_m, z_sd_m;
+  /* Prior of the state in place of the readings above, or null. */
+  const vlp_prior* prior;
 } vlp_sensors;
 
 /* An earlier frame of the same camera with the same velocity and yaw rate. */
@@ -115,37 +141,51 @@ typedef struct vlp_earlier_frame {
   double before_s;
 } vlp_earlier_frame;
 
+/* A state that explains a frame, and its likelihood relative to the sum over all candidates. */
+typedef struct vlp_candidate {
+  vlp_state state;
+  double likelihood;
+} vlp_candidate;
+
 typedef struct vlp_fix {
-  /* Result of vlp_locate(). The fields after `stamp` are zero unless this is VLP_OK. */
+  /* Result of vlp_locate(). The fields after `candidates` are zero unless this is VLP_OK. */
   int32_t status;
   /* Number of detections whose id is not in the map; these are ignored. */
   int32_t unknown_lamps;
   int64_t stamp;
-  /* Position of the robot's center or, without a mount, of the camera. */
-  double position_m[3];
-  /* Estimated if vlp_sensors leave roll and pitch free, otherwise as given; level is 0, as is a
-   * camera that looks straight down if the map states lamps_below_camera (rig/lamp_map.h). */
-  double roll_rad, pitch_rad;
-  double yaw_rad;
-  /* Covariance of (x, y, z, roll, pitch, yaw) by rows, including all known errors. If roll and
-   * pitch are not estimated, they have the variance of vlp_sensors.inclination_sigma_rad and no
-   * correlations. If that is 0, the camera is assumed to be exactly level or exactly read. */
-  double covariance[36];
+  /* States that explain the frame if the status is VLP_AMBIGUOUS, the most likely one first. */
+  int32_t num_candidates;
+  vlp_candidate candidates[6];
+  /* States that vlp_sensors do not leave free are as given. */
+  vlp_state state;
+  /* Covariance of the state by rows, including all known errors. Zero for states given as exact. */
+  double covariance[VLP_STATES * VLP_STATES];
   /* Part of the covariance that is independent between frames and averages out. */
-  double noise_covariance[36];
-  /* Velocity in the world; estimated if vlp_sensors leave it free, otherwise zero or as given. */
-  double velocity_m_per_s[2];
-  double yaw_rate_rad_per_s;
-  /* Covariance of (vx, vy, yaw rate) by rows, including all known errors. */
-  double velocity_covariance[9];
+  double noise_covariance[VLP_STATES * VLP_STATES];
   /* RMS distance in the image between the observed and the predicted lamps. */
   double residual_px;
+  /* Sum of the squared residuals over their variances, and its degrees of freedom (Fix). */
+  double chi_squared, redundancy;
   /* Number of lamps used for the fix; number of lamps rejected because the others contradict them,
    * and the ids of the first 32 of these. */
   int32_t lamps;
   int32_t rejected_lamps;
   int32_t rejected_ids[32];
 } vlp_fix;
+
+/* Use of a detection in a fix: DetectionUse of positioning/positioner.h. */
+enum { VLP_USED = 0, VLP_REJECTED = 1, VLP_NOT_IN_MAP = 2 };
+
+/* Comparison of a detection with a fix. */
+typedef struct vlp_residual {
+  int32_t use;
+  /* Predicted pixel, and detected minus predicted pixel. NaN, as the derivatives, if the map lacks
+   * the lamp or the lens does not image it. */
+  double predicted_px[2];
+  double residual_px[2];
+  /* Derivatives of the predicted pixel with respect to the state, by rows. */
+  double jacobian[2 * VLP_STATES];
+} vlp_residual;
 
 /* Returns the version of the library, such as "0.1.0". */
 const char* vlp_version(void);
@@ -175,6 +215,15 @@ void vlp_close(vlp_positioner* positioner);
 int32_t vlp_detect(const vlp_positioner* positioner, const vlp_image* image,
                    vlp_detection* detections, size_t capacity, size_t* count);
 
+/* Detects the lamps of an image in the level plane, writes them as vlp_detect(), and computes the
+ * fix of these detections. If roll and pitch are estimated, repeats the detection in the plane that
+ * is level by the fix: lamps are discs in the level plane, and centers detected in another plane
+ * are biased (locate_camera_in_image() in positioning/image_fix.h). `sensors` may be null. Returns
+ * the status of the fix, or an error as vlp_detect(). */
+int32_t vlp_locate_image(const vlp_positioner* positioner, const vlp_image* image,
+                         const vlp_sensors* sensors, vlp_detection* detections, size_t capacity,
+                         size_t* count, vlp_fix* fix);
+
 /* Computes the fix of one frame and returns its status. `sensors` may be null. Allocates no
  * memory. */
 int32_t vlp_locate(const vlp_positioner* positioner, const vlp_detection* detections, size_t count,
@@ -187,6 +236,18 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
                                 size_t count, const vlp_sensors* sensors,
                                 const vlp_earlier_frame* earlier, size_t earlier_count,
                                 vlp_fix* fix);
+
+/* Computes the pixel of a lamp of the map at a state, and its derivatives with respect to the state
+ * by rows. `jacobian` may be null. Returns VLP_OUTSIDE_LENS if the lens does not image the lamp,
+ * and VLP_BAD_ARGUMENT if the map lacks it. */
+int32_t vlp_project(const vlp_positioner* positioner, int32_t lamp, const vlp_state* state,
+                    double pixel[2], double jacobian[2 * VLP_STATES]);
+
+/* Compares the detections of the frame of a fix with its state, and writes one residual for each.
+ * `use` is exact for the rejected lamps that the fix lists. Returns VLP_BAD_ARGUMENT if the fix has
+ * no state. */
+int32_t vlp_compute_residuals(const vlp_positioner* positioner, const vlp_detection* detections,
+                              size_t count, const vlp_fix* fix, vlp_residual* residuals);
 
 /* Returns one line with the meaning of a status or an error and the remedy. Never null. */
 const char* vlp_describe_status(int32_t code);

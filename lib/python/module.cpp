@@ -17,6 +17,7 @@
 #include <limits>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <tuple>
@@ -30,6 +31,7 @@
 #include "lamps/light_detector.h"
 #include "lamps/signal/lamp_classifier.h"
 #include "lamps/signal/lamp_map_check.h"
+#include "positioning/image_fix.h"
 #include "positioning/positioner.h"
 #include "rig/input_error.h"
 #include "rig/lamp_map_file.h"
@@ -88,7 +90,7 @@ void check_length(const py::array& array, std::size_t length, const char* name) 
 
 /// Position and covariance of a frame without a fix.
 const Eigen::Vector3d kNowhere = Eigen::Vector3d::Constant(kNone);
-const Matrix4 kUnknown = Matrix4::Constant(kNone);
+const BodyCovariance kUnknown = BodyCovariance::Constant(kNone);
 
 // Lamp map, calibration, lens
 
@@ -160,11 +162,29 @@ Positioner make_positioner(const LampMapFile& lamps, const Calibration& calibrat
   return {lamps.map, calibration, options};
 }
 
+using StateVector = Eigen::Matrix<double, kBodyStates, 1>;
+
+StateVector make_state_array(const BodyState& state) {
+  const auto& [pose, motion] = state;
+  StateVector array;
+  array << pose.position_m, pose.yaw_rad, motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
+      motion.inclination.roll_rad, motion.inclination.pitch_rad;
+  return array;
+}
+
+BodyState make_state(const StateVector& array) {
+  return {{array.head<3>(), array[kBodyYaw]},
+          {array.segment<2>(kBodyVelocity),
+           array[kBodyYawRate],
+           {array[kBodyRoll], array[kBodyPitch]}}};
+}
+
 Sensors make_sensor_data(const std::optional<Pair>& inclination_rad, double inclination_sigma_rad,
                          const std::optional<Pair>& height_and_yaw, const Pair& height_and_yaw_sd,
                          const std::optional<Pair>& velocity_m_per_s, double velocity_sd_m_per_s,
                          double yaw_rate_rad_per_s, double yaw_rate_sd_rad_per_s,
-                         const std::optional<Pair>& height_m, const std::optional<double>& time_s) {
+                         const std::optional<Pair>& height_m, const std::optional<double>& time_s,
+                         const std::optional<std::pair<StateVector, BodyCovariance>>& prior) {
   Sensors sensors;
   if (inclination_rad) sensors.inclination = {(*inclination_rad)[0], (*inclination_rad)[1]};
   sensors.inclination_sigma_rad = inclination_sigma_rad;
@@ -180,6 +200,7 @@ Sensors make_sensor_data(const std::optional<Pair>& inclination_rad, double incl
   }
   if (height_m) sensors.height = {(*height_m)[0], (*height_m)[1]};
   sensors.time_s = time_s;
+  if (prior) sensors.prior = StatePrior{make_state(prior->first), prior->second};
   return sensors;
 }
 
@@ -236,7 +257,7 @@ py::dict locate_camera_in_frames(const Positioner& positioner, const py::object&
   Eigen::VectorXi frame(n), status(n), used(n);
   Rows3 position(n, 3);
   Eigen::VectorXd yaw(n), residual(n);
-  Doubles covariance(std::vector<py::ssize_t>{n, 4, 4});
+  Doubles covariance(std::vector<py::ssize_t>{n, kBodyStates, kBodyStates});
   double* const covariance_out = covariance.mutable_data();
   const int* const frame_in = frames.data();
   {
@@ -250,11 +271,11 @@ py::dict locate_camera_in_frames(const Positioner& positioner, const py::object&
       frame[i] = frame_in[begin];
       status[i] = static_cast<int>(fix.status);
       used[i] = ok ? fix.lamps : 0;
-      position.row(i) = ok ? fix.estimate.pose.position_m : kNowhere;
-      yaw[i] = ok ? fix.estimate.pose.yaw_rad : kNone;
+      position.row(i) = ok ? fix.state.pose.position_m : kNowhere;
+      yaw[i] = ok ? fix.state.pose.yaw_rad : kNone;
       residual[i] = ok ? fix.residual_px : kNone;
-      Eigen::Map<Matrix4>(covariance_out + 16 * i) =  // symmetric
-          ok ? fix.estimate.covariance : kUnknown;
+      Eigen::Map<BodyCovariance>(covariance_out + kUnknown.size() * i) =  // symmetric
+          ok ? fix.covariance : kUnknown;
     }
   }
   return py::dict("frame"_a = frame, "status"_a = status, "position_m"_a = position,
@@ -262,8 +283,40 @@ py::dict locate_camera_in_frames(const Positioner& positioner, const py::object&
                   "lamps"_a = used);
 }
 
-std::optional<BodyCovariance> make_body_covariance_array(const Fix& fix) {
-  return fix.body ? std::optional(fix.body->covariance) : std::nullopt;
+std::vector<std::pair<StateVector, double>> list_candidates(const Fix& fix) {
+  std::vector<std::pair<StateVector, double>> candidates;
+  for (const auto& [state, likelihood] :
+       std::span(fix.candidates).first(static_cast<std::size_t>(fix.num_candidates))) {
+    candidates.emplace_back(make_state_array(state), likelihood);
+  }
+  return candidates;
+}
+
+using JacobianByRows = Eigen::Matrix<double, 2, kBodyStates, Eigen::RowMajor>;
+
+py::tuple project_lamp(const Positioner& positioner, int lamp, const StateVector& state) {
+  const LampProjection projection = positioner.project_lamp(lamp, make_state(state));
+  return py::make_tuple(projection.pixel, JacobianByRows(projection.jacobian));
+}
+
+py::dict compute_residuals(const Positioner& positioner, const py::object& lamps,
+                           const Doubles& pixels, const Fix& fix) {
+  const auto detections = make_detections(to_integers(lamps, "lamps"), pixels, std::nullopt);
+  const auto n = std::ssize(detections);
+  constexpr std::array uses{"used", "rejected", "not_in_map"};
+  py::list use;
+  Rows2 predicted(n, 2), residual(n, 2);
+  Doubles jacobian(std::vector<py::ssize_t>{n, 2, kBodyStates});
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const DetectionResidual of =
+        positioner.compute_detection_residual(detections[static_cast<std::size_t>(i)], fix);
+    use.append(uses[static_cast<std::size_t>(of.use)]);
+    predicted.row(i) = of.predicted.pixel;
+    residual.row(i) = of.residual_px;
+    Eigen::Map<JacobianByRows>(jacobian.mutable_data(i)) = of.predicted.jacobian;
+  }
+  return py::dict("use"_a = use, "predicted_px"_a = predicted, "residual_px"_a = residual,
+                  "jacobian"_a = jacobian);
 }
 
 std::vector<int> list_rejected_lamp_ids(const Fix& fix) {
@@ -274,7 +327,7 @@ std::vector<int> list_rejected_lamp_ids(const Fix& fix) {
 
 std::string to_repr(const Fix& fix) {
   if (!fix.has_succeeded()) return "<vlp.Fix: " + std::string(fix_status_name(fix.status)) + ">";
-  const Pose& pose = fix.estimate.pose;
+  const Pose& pose = fix.state.pose;
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(), "<vlp.Fix: x %.4f m, y %.4f m, z %.4f m, yaw %.4f rad>",
                 pose.position_m.x(), pose.position_m.y(), pose.position_m.z(), pose.yaw_rad);
@@ -318,25 +371,49 @@ std::string format_pixel_size(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
-  const auto& [detector, imager_px] = of_camera;
-  const auto rows = py::array::ensure(array, py::array::c_style);
+/// Returns the pixels of an image of the camera. @throws std::invalid_argument for another size
+ImageView make_view_of_camera_image(const py::array& rows, const std::array<int, 2>& imager_px) {
   const ImageView image = make_image_view(rows);
   if (image.width != imager_px[0] || image.height != imager_px[1]) {
     throw std::invalid_argument("the image is " + format_pixel_size(image.width, image.height) +
                                 ", the calibration's camera has " +
                                 format_pixel_size(imager_px[0], imager_px[1]) + " px");
   }
+  return image;
+}
+
+py::tuple detect(const ImageDetector& of_camera, const py::array& array) {
+  const auto& [detector, imager_px] = of_camera;
+  const auto rows = py::array::ensure(array, py::array::c_style);
+  const ImageView image = make_view_of_camera_image(rows, imager_px);
   std::vector<Detection> detections;
   {
     const py::gil_scoped_release others_may_run;
-    for (const Light& light : detector.detect_lights(image)) {
-      if (light.kind == LightKind::lamp) {
-        detections.push_back({*light.lamp, light.pixel, light.sigma_px});
-      }
-    }
+    detections = select_lamps(detector.detect_lights(image));
   }
   return to_arrays(detections);
+}
+
+py::tuple locate_image(const Positioner& positioner, const ImageDetector& of_camera,
+                       const py::array& array, const Sensors& sensors) {
+  const LightDetector& detector = of_camera.detector;
+  const auto rows = py::array::ensure(array, py::array::c_style);
+  const ImageView image = make_view_of_camera_image(rows, of_camera.imager_px);
+  const auto inclination = sensors.known_inclination();
+  ImageFix found;
+  {
+    const py::gil_scoped_release others_may_run;
+    const auto detect_in_plane = [&](const std::optional<Eigen::Matrix3d>& level_from_camera) {
+      return select_lamps(
+          detector.copy_detector_for_camera_tilt(level_from_camera).detect_lights(image));
+    };
+    found = locate_with_repeated_detection(
+        positioner, sensors,
+        inclination ? detect_in_plane(positioner.compute_level_from_camera(*inclination))
+                    : select_lamps(detector.detect_lights(image)),
+        detect_in_plane);
+  }
+  return py::make_tuple(found.fix, to_arrays(found.detections));
 }
 
 ImageDetector make_detector(const LampMapFile& lamps, const Calibration& calibration,
@@ -478,43 +555,36 @@ void define_fix(py::module_& m) {
       .def_property_readonly("status", [](const Fix& fix) { return fix_status_name(fix.status); })
       .def_property_readonly("explanation",
                              [](const Fix& fix) { return describe_fix_status(fix.status); })
-      .def_property_readonly("position_m",
-                             [](const Fix& fix) {
-                               return fix.has_succeeded() ? fix.estimate.pose.position_m : kNowhere;
-                             })
+      .def_property_readonly(
+          "position_m",
+          [](const Fix& fix) { return fix.has_succeeded() ? fix.state.pose.position_m : kNowhere; })
       .def_property_readonly(
           "yaw_rad",
-          [](const Fix& fix) { return fix.has_succeeded() ? fix.estimate.pose.yaw_rad : kNone; })
+          [](const Fix& fix) { return fix.has_succeeded() ? fix.state.pose.yaw_rad : kNone; })
+      .def_property_readonly(
+          "state",
+          [](const Fix& fix) -> StateVector {
+            return fix.has_succeeded() ? make_state_array(fix.state) : StateVector(kUnknown.col(0));
+          },
+          "(9), x, y, z, yaw, velocity along the axes of the level frame (2), yaw rate, roll,\n"
+          "pitch; as given where not estimated.")
       .def_property_readonly(
           "covariance",
-          [](const Fix& fix) { return fix.has_succeeded() ? fix.estimate.covariance : kUnknown; },
-          "(4, 4), covariance of x, y, z, yaw from all known error sources.")
+          [](const Fix& fix) { return fix.has_succeeded() ? fix.covariance : kUnknown; },
+          "(9, 9), covariance of `state` from all known error sources; 0 where given as exact.")
       .def_property_readonly(
           "noise_covariance",
           [](const Fix& fix) { return fix.has_succeeded() ? fix.noise_covariance : kUnknown; },
           "The part that is of this frame alone and averages out.")
       .def_property_readonly(
-          "roll_pitch_rad",
-          [](const Fix& fix) -> std::optional<Pair> {
-            if (!fix.body) return std::nullopt;
-            return Pair{fix.body->inclination.roll_rad, fix.body->inclination.pitch_rad};
-          },
-          "(roll, pitch) where they were estimated.")
-      .def_property_readonly(
-          "velocity_m_per_s",
-          [](const Fix& fix) -> std::optional<Pair> {
-            if (!fix.body) return std::nullopt;
-            return Pair{fix.body->velocity_m_per_s.x(), fix.body->velocity_m_per_s.y()};
-          },
-          "In the world, if estimated.")
+          "candidates", &list_candidates,
+          "If the status is ambiguous: (state, likelihood) of each state that explains the frame.")
+      .def_readonly("chi_squared", &Fix::chi_squared)
+      .def_readonly("redundancy", &Fix::redundancy, "Degrees of freedom of chi_squared.")
       .def_property_readonly(
           "residual_px",
           [](const Fix& fix) { return fix.has_succeeded() ? fix.residual_px : kNone; })
       .def_readonly("lamps", &Fix::lamps, "Used for the fix.")
-      .def_property_readonly(
-          "body_covariance", &make_body_covariance_array,
-          "Covariance of (x, y, z, yaw, vx, vy, yaw rate, roll, pitch), where motion or tilt was "
-          "estimated.")
       .def_readonly("rejected_lamps", &Fix::rejected_lamps)
       .def_property_readonly(
           "rejected_ids", &list_rejected_lamp_ids,
@@ -527,16 +597,19 @@ void define_fix(py::module_& m) {
 /// Defines sensors, positioner and lamp detector.
 void define_positioner(py::module_& m) {
   py::class_<Sensors>(m, "Sensors", "Sensor readings of the robot for a frame.")
-      .def(py::init(&make_sensor_data), py::kw_only(), "inclination_rad"_a = py::none(),
-           "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
-           "height_and_yaw_sd"_a = Pair{0, 0}, "velocity_m_per_s"_a = py::none(),
-           "velocity_sd_m_per_s"_a = 0.0, "yaw_rate_rad_per_s"_a = 0.0,
-           "yaw_rate_sd_rad_per_s"_a = 0.0, "height_m"_a = py::none(), "time_s"_a = py::none(),
-           "inclination_rad: (roll, pitch), and its standard deviation, with which they are\n"
-           "estimated. height_and_yaw: (z, yaw) of the camera, for fixes of one lamp;\n"
-           "height_and_yaw_sd: their standard deviations. velocity_m_per_s: in\n"
-           "the level frame; with standard deviations it is estimated. height_m: (z, sd), with a\n"
-           "standard deviation that is positive.");
+      .def(
+          py::init(&make_sensor_data), py::kw_only(), "inclination_rad"_a = py::none(),
+          "inclination_sigma_rad"_a = 0.0, "height_and_yaw"_a = py::none(),
+          "height_and_yaw_sd"_a = Pair{0, 0}, "velocity_m_per_s"_a = py::none(),
+          "velocity_sd_m_per_s"_a = 0.0, "yaw_rate_rad_per_s"_a = 0.0,
+          "yaw_rate_sd_rad_per_s"_a = 0.0, "height_m"_a = py::none(), "time_s"_a = py::none(),
+          "prior"_a = py::none(),
+          "inclination_rad: (roll, pitch), and its standard deviation, with which they are\n"
+          "estimated. height_and_yaw: (z, yaw) of the camera, for fixes of one lamp;\n"
+          "height_and_yaw_sd: their standard deviations. velocity_m_per_s: in\n"
+          "the level frame; with standard deviations it is estimated. height_m: (z, sd), with a\n"
+          "standard deviation that is positive. prior: (state (9), covariance (9, 9)) in place of\n"
+          "the others; infinite variance of x, y, z or yaw: unknown, 0: exact.");
 
   py::class_<Positioner>(m, "Positioner", "From identified lamps in an image to a position.")
       .def(py::init(&make_positioner), "lamp_map"_a, "calibration"_a, py::kw_only(),
@@ -553,7 +626,18 @@ void define_positioner(py::module_& m) {
           "sigma_px"_a = py::none(), "sensors"_a = Sensors(),
           "Fixes of many frames: the detections of one follow each other and have the same number\n"
           "in `frames`. A dict of arrays, a row for each frame: frame, status (an index of\n"
-          "STATUSES, 0: ok), position_m, yaw_rad, covariance, residual_px, lamps.");
+          "STATUSES, 0: ok), position_m, yaw_rad, covariance, residual_px, lamps.")
+      .def("project", &project_lamp, "lamp"_a, "state"_a,
+           "Pixel (2) of a lamp at a state (9), and its derivatives (2, 9); NaN if the map lacks "
+           "it\n"
+           "or the lens does not image it.")
+      .def("locate_image", &locate_image, "detector"_a, "image"_a, "sensors"_a = Sensors(),
+           "The Fix of an image, and its detections as LampDetector.detect returns them. If roll "
+           "and\n"
+           "pitch are estimated, lamps are detected again in the plane that is level by the fix.")
+      .def("residuals", &compute_residuals, "lamps"_a, "pixels"_a, "fix"_a,
+           "Detections of the frame of a fix compared with it. A dict, a row for each: use (used,\n"
+           "rejected, not_in_map), predicted_px, residual_px, jacobian (2, 9) by the state.");
 
   py::class_<ImageDetector>(m, "LampDetector", "Finds and identifies the lamps of a map in images.")
       .def(py::init(&make_detector), "lamp_map"_a, "calibration"_a, "classifier"_a = py::none(),

@@ -61,7 +61,7 @@ std::vector<ReferencePointCapture> move_reference_points_to_camera(const KnownPo
     const Fix fix = locate_capture(positioner, captures[i]);
     if (!fix.has_succeeded()) continue;
     captures[i].reference_point_m +=
-        rotation_about_z(fix.estimate.pose.yaw_rad).topLeftCorner<2, 2>() * arm_m;
+        rotation_about_z(fix.state.pose.yaw_rad).topLeftCorner<2, 2>() * arm_m;
   }
   return captures;
 }
@@ -75,7 +75,7 @@ double compute_mean_height_m(const KnownPositions& places, const LampMap& lamps,
   for (const ReferencePointCapture& capture : places.captures) {
     const Fix fix = locate_capture(positioner, capture);
     if (!fix.has_succeeded()) continue;
-    height_m += lamps.lamps.front().position_m.z() - fix.estimate.pose.position_m.z();
+    height_m += lamps.lamps.front().position_m.z() - fix.state.pose.position_m.z();
     ++fixes;
   }
   return fixes > 0 ? height_m / fixes : 0;

@@ -19,7 +19,7 @@
 #include "geometry/angles.h"
 #include "geometry/median.h"
 #include "geometry/polygon.h"
-#include "positioning/correction.h"
+#include "positioning/image_fix.h"
 #include "positioning/known_motion.h"
 #include "positioning/lamps_below.h"
 #include "positioning/residual_noise.h"
@@ -27,6 +27,7 @@
 #include "rig/find_lamp.h"
 #include "rig/yaml_text.h"
 #include "session/lamp_captures.h"
+#include "session/pixel_noise.h"
 #include "session/row_time_step.h"
 
 namespace vlp {
@@ -164,6 +165,8 @@ std::span<const int> list_rejected(const Fix& fix) {
   return std::span(fix.rejected_ids).first(std::min(fix.rejected_ids.size(), count));
 }
 
+bool is_state_estimated(const Fix& fix, int state) { return fix.covariance(state, state) > 0; }
+
 FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix& fix,
                     bool noise_known) {
   FixRow row{frame.image, std::string(fix_status_name(fix.status)), {}, fix.lamps};
@@ -171,17 +174,17 @@ FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix
     row.time_s = entry->second.time_s;
   }
   if (!fix.has_succeeded()) return row;
-  row.fix = {fix.estimate.pose, {}, fix.residual_px};
-  if (const auto& body = fix.body) {
-    const auto is_uncertain = [&](int index) { return body->covariance(index, index) > 0; };
-    if (is_uncertain(kBodyVelocity) || !body->velocity_m_per_s.isZero(0))
-      row.fix->velocity_m_per_s = body->velocity_m_per_s;
-    if (is_uncertain(kBodyRoll)) row.fix->inclination = body->inclination;
+  row.fix = {fix.state.pose, {}, fix.residual_px};
+  const BodyMotion& motion = fix.state.motion;
+  if (is_state_estimated(fix, kBodyVelocity) || !motion.velocity_m_per_s.isZero(0)) {
+    row.fix->velocity_m_per_s =
+        Eigen::Rotation2Dd(fix.state.pose.yaw_rad) * motion.velocity_m_per_s;
   }
+  if (is_state_estimated(fix, kBodyRoll)) row.fix->inclination = motion.inclination;
   if (noise_known) {
-    row.fix->sd = fix.estimate.covariance.diagonal().cwiseSqrt();
-    if (fix.estimate.covariance != fix.noise_covariance) {
-      row.fix->noise_sd = fix.noise_covariance.diagonal().cwiseSqrt();
+    row.fix->sd = fix.covariance.diagonal().head<4>().cwiseSqrt();
+    if (fix.covariance != fix.noise_covariance) {
+      row.fix->noise_sd = fix.noise_covariance.diagonal().head<4>().cwiseSqrt();
     }
   }
   const auto rejected = list_rejected(fix);
@@ -192,11 +195,11 @@ FixRow make_fix_row(const Frame& frame, const CapturesTable& captures, const Fix
 /// Returns the pose of a fix whose roll and pitch are estimated; std::nullopt for other fixes.
 std::optional<PoseRow> find_pose_row(const std::string& image, const Fix& fix, bool noise_known,
                                      bool is_camera_turned_over) {
-  if (!fix.has_succeeded() || !fix.body || !(fix.body->covariance(kBodyRoll, kBodyRoll) > 0))
-    return std::nullopt;
-  const auto& [position_m, yaw_rad] = fix.estimate.pose;
+  if (!fix.has_succeeded() || !is_state_estimated(fix, kBodyRoll)) return std::nullopt;
+  const auto& [position_m, yaw_rad] = fix.state.pose;
   const Eigen::Matrix3d world_from_level = rotation_about_z(yaw_rad);
-  const Eigen::Matrix3d level_from_body = level_rotation_from_inclination(fix.body->inclination);
+  const Eigen::Matrix3d level_from_body =
+      level_rotation_from_inclination(fix.state.motion.inclination);
   Eigen::Matrix3d world_from_camera = world_from_level * level_from_body;
   if (is_camera_turned_over) world_from_camera.rightCols<2>() *= -1;
   PoseRow row{image, position_m, Eigen::Quaterniond(world_from_camera), {}};
@@ -208,7 +211,7 @@ std::optional<PoseRow> find_pose_row(const std::string& image, const Fix& fix, b
   d_pose_d_body.block<3, 1>(3, kBodyYaw) = Eigen::Vector3d::UnitZ();
   d_pose_d_body.block<3, 1>(3, kBodyPitch) = world_from_level.col(1);
   d_pose_d_body.block<3, 1>(3, kBodyRoll) = world_from_level * level_from_body.col(0);
-  row.covariance = d_pose_d_body * fix.body->covariance * d_pose_d_body.transpose();
+  row.covariance = d_pose_d_body * fix.covariance * d_pose_d_body.transpose();
   return row;
 }
 
@@ -243,6 +246,14 @@ bool is_assumed_standing(const LocateInput& input) {
   });
 }
 
+/// Returns true if roll and pitch of no camera are given or estimated.
+bool is_assumed_level(const LocateInput& input) {
+  return std::ranges::none_of(input.frames, [&](const Frame& frame) {
+    const Sensors sensors = make_capture_sensor_readings(frame.image, input);
+    return sensors.inclination || sensors.inclination_sigma_rad > 0;
+  });
+}
+
 std::size_t count_fixes(const std::vector<Fix>& fixes) {
   return static_cast<std::size_t>(std::count_if(
       fixes.begin(), fixes.end(), [](const Fix& fix) { return fix.has_succeeded(); }));
@@ -252,10 +263,9 @@ std::size_t count_fixes(const std::vector<Fix>& fixes) {
 std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
   std::vector<double> speeds, sigmas;
   for (const Fix& fix : fixes) {
-    if (!fix.has_succeeded() || !fix.body) continue;
-    const Eigen::Vector2d& velocity = fix.body->velocity_m_per_s;
-    const double variance =
-        fix.body->covariance.block<2, 2>(kBodyVelocity, kBodyVelocity).trace() / 2;
+    if (!fix.has_succeeded() || !is_state_estimated(fix, kBodyVelocity)) continue;
+    const Eigen::Vector2d& velocity = fix.state.motion.velocity_m_per_s;
+    const double variance = fix.covariance.block<2, 2>(kBodyVelocity, kBodyVelocity).trace() / 2;
     speeds.push_back(velocity.norm());
     sigmas.push_back(velocity.norm() / std::sqrt(variance));
   }
@@ -264,35 +274,90 @@ std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
   return upper_median(speeds);
 }
 
-/// Warns if motion explains failed frames or residuals of a camera that is assumed to stand.
-/// Criterion: half as many failures, or half the residual.
-void warn_about_motion(LocateResult& result, const LocateInput& input, bool is_noisy) {
-  const std::size_t failed = input.frames.size() - count_fixes(result.fixes);
-  if (!make_readout_clock(input.calibration.camera) || !is_assumed_standing(input) ||
-      (!is_noisy && 2 * failed < input.frames.size())) {
-    return;
+/// Returns the median angle between the camera and the vertical, rad, of fixes whose roll and pitch
+/// are estimated, if that is significant.
+std::optional<double> find_tilt_rad(const std::vector<Fix>& fixes) {
+  std::vector<double> tilts, sigmas;
+  for (const Fix& fix : fixes) {
+    if (!fix.has_succeeded()) continue;
+    const auto& [roll_rad, pitch_rad] = fix.state.motion.inclination;
+    tilts.push_back(std::hypot(roll_rad, pitch_rad));
+    sigmas.push_back(tilts.back() / std::sqrt(fix.covariance.diagonal().tail<2>().maxCoeff()));
   }
+  constexpr double min_sigmas = 3;
+  if (tilts.empty() || upper_median(sigmas) < min_sigmas) return std::nullopt;
+  return upper_median(tilts);
+}
+
+/// A state of the camera that explains failed frames or residuals, with the remaining noise.
+struct Explanation {
+  double noise_px;
+  std::string warning;
+};
+
+/// Returns the fixes with other assumptions if they explain failed frames or residuals. Criterion:
+/// half as many failures, or half the residual.
+std::optional<std::vector<Fix>> find_better_fixes(const LocateResult& result,
+                                                  const LocateInput& other,
+                                                  const PositionerOptions& options, bool is_noisy) {
+  const std::size_t failed = other.frames.size() - count_fixes(result.fixes);
+  std::vector<Fix> fixes = locate_all_frames(other, options);
+  const ResidualSums residuals = sum_squared_residuals_of_fixes(fixes);
+  const auto noise_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
+  const auto other_px = estimate_pixel_noise_px(residuals);
+  const bool fits = is_noisy ? other_px && *other_px < *noise_px / 2
+                             : 2 * (other.frames.size() - count_fixes(fixes)) < failed;
+  // More unknowns fit the errors if there are few residuals.
+  constexpr double min_degrees_of_freedom = 12;
+  if (!fits || residuals.degrees_of_freedom < min_degrees_of_freedom) return std::nullopt;
+  return fixes;
+}
+
+std::optional<Explanation> explain_by_motion(const LocateResult& result, const LocateInput& input,
+                                             bool is_noisy) {
+  if (!make_readout_clock(input.calibration.camera) || !is_assumed_standing(input))
+    return std::nullopt;
   constexpr double max_speed_m_per_s = 3, max_yaw_rate_rad_per_s = 2;
   LocateInput moving = input;
   moving.motion =
       KnownMotion::make_motion_prior_from_limits(max_speed_m_per_s, max_yaw_rate_rad_per_s);
-  const std::vector<Fix> fixes = locate_all_frames(moving, input.positioner_options);
-  const auto standing_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
-  const auto moving_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(fixes));
-  const std::size_t still_failed = input.frames.size() - count_fixes(fixes);
-  const bool fits =
-      is_noisy ? moving_px && *moving_px < *standing_px / 2 : 2 * still_failed < failed;
-  const auto speed_m_per_s = find_speed_m_per_s(fixes);
-  // Velocity and yaw rate fit the errors if there are few residuals.
-  constexpr double min_degrees_of_freedom = 12;
-  if (!fits || !speed_m_per_s || *speed_m_per_s > max_speed_m_per_s ||
-      sum_squared_residuals_of_fixes(fixes).degrees_of_freedom < min_degrees_of_freedom) {
-    return;
-  }
-  result.warnings.push_back(
+  const auto fixes = find_better_fixes(result, moving, input.positioner_options, is_noisy);
+  const auto speed_m_per_s = fixes ? find_speed_m_per_s(*fixes) : std::nullopt;
+  if (!speed_m_per_s || *speed_m_per_s > max_speed_m_per_s) return std::nullopt;
+  return Explanation{
+      estimate_pixel_noise_px(sum_squared_residuals_of_fixes(*fixes)).value_or(0),
       fmt::format("the images fit a moving camera, at {:.2g} m/s: state velocities in "
                   "captures.csv, or --max-speed-m-per-s",
-                  *speed_m_per_s));
+                  *speed_m_per_s)};
+}
+
+std::optional<Explanation> explain_by_tilt(const LocateResult& result, const LocateInput& input,
+                                           bool is_noisy) {
+  if (!is_assumed_level(input)) return std::nullopt;
+  LocateInput tilted = input;
+  tilted.roll_pitch_sd_rad = 0.15;
+  const auto fixes = find_better_fixes(result, tilted, input.positioner_options, is_noisy);
+  const auto tilt_rad = fixes ? find_tilt_rad(*fixes) : std::nullopt;
+  if (!tilt_rad) return std::nullopt;
+  return Explanation{
+      estimate_pixel_noise_px(sum_squared_residuals_of_fixes(*fixes)).value_or(0),
+      fmt::format("the images fit a tilted camera, by {:.2g} degrees: state inclinations in "
+                  "captures.csv, or --roll-pitch-sd-deg",
+                  deg_from_rad(*tilt_rad))};
+}
+
+/// Warns if motion or tilt explains failed frames or residuals of a camera that is assumed to stand
+/// or to be level. Names the one that leaves less noise.
+void warn_about_motion_or_tilt(LocateResult& result, const LocateInput& input, bool is_noisy) {
+  const std::size_t failed = input.frames.size() - count_fixes(result.fixes);
+  if (!is_noisy && 2 * failed < input.frames.size()) return;
+  const auto motion = explain_by_motion(result, input, is_noisy);
+  const auto tilt = explain_by_tilt(result, input, is_noisy);
+  if (motion && !(tilt && tilt->noise_px < motion->noise_px)) {
+    result.warnings.push_back(motion->warning);
+  } else if (tilt) {
+    result.warnings.push_back(tilt->warning);
+  }
 }
 
 /// Scales the given noise of all detections and removes the detections that `fixes` reject.
@@ -325,35 +390,49 @@ void locate_with_scaled_noise(const LocateInput& input, const PositionerOptions&
   }
 }
 
+/// Estimates the noise of the frames of which all detections state one, or of the others.
+NoiseScale estimate_noise_scale_of_frames(const LocateInput& input, const std::vector<Fix>& fixes,
+                                          bool is_stated) {
+  std::vector<Frame> frames;
+  std::vector<Fix> selected;
+  for (std::size_t i = 0; i < fixes.size(); ++i) {
+    if (has_pixel_noise(input.frames[i]) != is_stated) continue;
+    frames.push_back(input.frames[i]);
+    selected.push_back(fixes[i]);
+  }
+  return estimate_noise_scale(
+      frames, selected, Positioner(input.lamps, input.calibration, input.positioner_options),
+      input.lamps, input.calibration, input.positioner_options.unstated_sigma_px);
+}
+
 /// Locates all frames. Uses the noise estimated from the residuals if none is given or the given
 /// one is too small. Returns true if the noise is known.
 bool locate_with_noise(const LocateInput& input, LocateResult& result) {
-  // The reported errors of calibration and map contribute to the residuals.
   PositionerOptions positioner_options = input.positioner_options;
-  positioner_options.computes_common_chi_squared = true;
   result.fixes = locate_all_frames(input, positioner_options);
-  std::vector<Fix> stated, unstated;
-  for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    (has_pixel_noise(input.frames[i]) ? stated : unstated).push_back(result.fixes[i]);
-  }
-  const ResidualSums residuals = sum_squared_residuals_of_fixes(stated);
-  const double factor = estimate_birge_ratio(residuals);
+  const NoiseScale stated = estimate_noise_scale_of_frames(input, result.fixes, true);
+  const NoiseScale unstated = estimate_noise_scale_of_frames(input, result.fixes, false);
+  const bool are_all_stated = std::ranges::all_of(input.frames, has_pixel_noise);
+  // Fewer degrees of freedom determine the factor to 22 % at best.
+  constexpr double min_degrees_of_freedom = 10;
+  const double factor =
+      stated.degrees_of_freedom >= min_degrees_of_freedom ? std::max(1.0, stated.factor) : 1;
   bool is_noisy = false;
-  if (unstated.empty()) is_noisy = warn_about_noise(result, input.frames, factor);
-  warn_about_motion(result, input, is_noisy);
+  if (are_all_stated) is_noisy = warn_about_noise(result, input.frames, factor);
+  warn_about_motion_or_tilt(result, input, is_noisy);
   constexpr double chance_sds = 3;
-  if (!is_noisy && factor > 1 + chance_sds * std::sqrt(0.5 / residuals.degrees_of_freedom)) {
+  if (!is_noisy && factor > 1 + chance_sds * std::sqrt(0.5 / stated.degrees_of_freedom)) {
     result.notes.push_back(fmt::format(
         "residuals are {:.2f} times the stated noise: sd follows the residuals", factor));
   }
-  positioner_options = input.positioner_options;
   bool is_known = true;
-  if (!unstated.empty()) {
-    auto unstated_factor = estimate_noise_scale_factor(sum_squared_residuals_of_fixes(unstated));
+  if (!are_all_stated) {
     // Few frames without given noise may have no redundancy: then the noise in pixels is estimated
     // from all frames.
-    if (!unstated_factor)
-      unstated_factor = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
+    const auto unstated_factor =
+        unstated.degrees_of_freedom > 0
+            ? std::optional(unstated.factor)
+            : estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
     is_known = unstated_factor.has_value();
     if (is_known) {
       positioner_options.unstated_sigma_px = std::clamp(
@@ -368,7 +447,7 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
           "sigma_px is neither stated nor determined by residuals: sd columns are empty");
     }
   }
-  if (factor > 1 || (is_known && !unstated.empty())) {
+  if (factor > 1 || (is_known && !are_all_stated)) {
     locate_with_scaled_noise(input, positioner_options, factor, result.fixes);
   }
   return is_known;
@@ -437,9 +516,10 @@ MapErrors find_errors_while_standing(const LocateInput& input, const std::vector
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     const Sensors sensors = make_capture_sensor_readings(input.frames[i].image, input);
     if (sensors.motion && may_camera_move_during_readout(*sensors.motion)) continue;
-    const auto& body = fixes[i].body;
     frames.push_back(input.frames[i]);
-    options.inclinations.push_back(body ? std::optional(body->inclination) : sensors.inclination);
+    options.inclinations.push_back(is_state_estimated(fixes[i], kBodyRoll)
+                                       ? std::optional(fixes[i].state.motion.inclination)
+                                       : sensors.inclination);
     auto& inclination = options.inclinations.back();
     if (inclination) inclination = turn_over_if(below, *inclination);
   }
@@ -542,138 +622,26 @@ LocateResult locate_camera_from_detections(const LocateInput& input) {
 
 namespace {
 
-/// A capture whose tilt is estimated.
-struct TiltedCapture {
-  std::size_t frame;
-  std::vector<Detection> first_detections;
-  /// Plane of the current detections; std::nullopt: that of the first ones.
-  std::optional<std::optional<Eigen::Matrix3d>> level = std::nullopt;
-  bool has_converged = false;
-};
-
-class TiltedCaptures {
- public:
-  TiltedCaptures(LocateInput& input, const Redetector& redetect)
-      : input_(input),
-        redetect_(redetect),
-        base_from_camera_(compute_level_from_camera_matrix(input.calibration,
-                                                           input.positioner_options.correction)) {
-    for (std::size_t i = 0; i < input.frames.size(); ++i) {
-      const Frame& frame = input.frames[i];
-      if (make_capture_sensor_readings(frame.image, input).inclination_sigma_rad > 0) {
-        captures_.push_back({i, frame.detections});
-      }
+/// Repeats the detection of lamps in the level plane of the fix if the tilt is estimated.
+std::vector<Light> repeat_detection_if_tilted(const LocateInput& input,
+                                              const Positioner& positioner,
+                                              const std::string& image, std::vector<Light> lights,
+                                              const LightsInPlane& detect) {
+  const Sensors sensors = make_capture_sensor_readings(image, input);
+  if (sensors.inclination_sigma_rad == 0) return lights;
+  std::vector<std::vector<Light>> repetitions;
+  const auto add = [&](std::vector<Light> found) {
+    std::vector<Detection> lamps = select_lamps(found);
+    for (Detection& lamp : lamps) {
+      if (input.sigma_px) lamp.sigma_px = input.sigma_px;
     }
-  }
-
-  LevelRotations iterate_until_tilt_converges() {
-    if (captures_.empty()) return {};
-    fixes_ = locate_camera_from_detections(input_).fixes;
-    initialize_tilt_from_ellipses();
-    constexpr int max_iterations = 6;
-    for (int i = 0; i < max_iterations && redetect_in_level_planes(); ++i) {
-    }
-    LevelRotations levels;
-    for (const TiltedCapture& capture : captures_) {
-      if (capture.level) levels.emplace(image_name(capture), *capture.level);
-    }
-    return levels;
-  }
-
- private:
-  const std::string& image_name(const TiltedCapture& capture) const {
-    return input_.frames[capture.frame].image;
-  }
-
-  void detect_in_level_planes(const LevelRotations& levels) {
-    if (levels.empty()) return;
-    std::vector<Frame> seen = redetect_(levels);
-    for (const TiltedCapture& capture : captures_) {
-      if (levels.find(image_name(capture)) == levels.end()) continue;
-      const auto frame = std::find_if(seen.begin(), seen.end(), [&](const Frame& candidate) {
-        return candidate.image == image_name(capture);
-      });
-      if (frame != seen.end()) {
-        input_.frames[capture.frame].detections = std::move(frame->detections);
-      }
-    }
-    fixes_ = locate_camera_from_detections(input_).fixes;
-  }
-
-  void initialize_tilt_from_ellipses() {
-    constexpr double max_small_tilt_rad = 0.05;
-    const std::vector<Fix> first = fixes_;
-    LevelRotations levels;
-    for (TiltedCapture& capture : captures_) {
-      const double sd_rad =
-          make_capture_sensor_readings(image_name(capture), input_).inclination_sigma_rad;
-      if (sd_rad <= max_small_tilt_rad && fixes_[capture.frame].has_succeeded()) continue;
-      capture.level.emplace();
-      levels.emplace(image_name(capture), std::nullopt);
-    }
-    detect_in_level_planes(levels);
-    for (TiltedCapture& capture : captures_) {
-      const Fix& fix = first[capture.frame];
-      std::vector<Detection>& seen = input_.frames[capture.frame].detections;
-      if (fixes_[capture.frame].has_succeeded()) continue;
-      capture.has_converged = !fix.has_succeeded();
-      if (!fix.has_succeeded() && seen.size() > capture.first_detections.size()) continue;
-      capture.level.reset();
-      seen = capture.first_detections;
-      fixes_[capture.frame] = fix;
-    }
-  }
-
-  /// Repeats the detections that have not converged. Returns false if there are none.
-  bool redetect_in_level_planes() {
-    LevelRotations levels;
-    for (TiltedCapture& capture : captures_) {
-      const Fix& fix = fixes_[capture.frame];
-      capture.has_converged = capture.has_converged || !fix.has_succeeded() || !fix.body;
-      if (capture.has_converged) continue;
-      const bool below = input_.lamps.lamps_below_camera;
-      const CameraMount mount =
-          input_.positioner_options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0});
-      capture.level = compute_level_rotation_from_inclination(
-          turn_over_if(below, fix.body->inclination), turn_over_if(below, mount).yaw_in_robot_rad,
-          base_from_camera_);
-      levels.emplace(image_name(capture), *capture.level);
-    }
-    const std::vector<Fix> before = fixes_;
-    detect_in_level_planes(levels);
-    for (TiltedCapture& capture : captures_) {
-      if (capture.has_converged) continue;
-      capture.has_converged = has_fix_converged(before[capture.frame], fixes_[capture.frame]);
-    }
-    return !levels.empty();
-  }
-
-  static bool has_fix_converged(const Fix& before, const Fix& after) {
-    constexpr double tolerance_sd = 0.1;
-    if (!after.has_succeeded()) return true;
-    Eigen::Vector4d change;
-    change << after.estimate.pose.position_m - before.estimate.pose.position_m,
-        wrap_angle_rad(after.estimate.pose.yaw_rad - before.estimate.pose.yaw_rad);
-    const Eigen::Vector4d sd = after.noise_covariance.diagonal().cwiseSqrt();
-    return (change.cwiseAbs().array() <= tolerance_sd * sd.array()).all();
-  }
-
-  LocateInput& input_;
-  const Redetector& redetect_;
-  Eigen::Matrix3d base_from_camera_;
-  std::vector<TiltedCapture> captures_;
-  std::vector<Fix> fixes_;
-};
-
-/// Applies an intake to the named images again.
-Observations detect_in_images_again(const LampIntake& intake,
-                                    const std::vector<std::filesystem::path>& files,
-                                    const LevelRotations& levels) {
-  std::vector<std::filesystem::path> named;
-  std::copy_if(files.begin(), files.end(), std::back_inserter(named), [&](const auto& file) {
-    return levels.find(file.filename().string()) != levels.end();
-  });
-  return intake.copy_intake_with_level_rotations(levels).detect_lamps_in_all_images(named);
+    repetitions.push_back(std::move(found));
+    return lamps;
+  };
+  const ImageFix found = locate_with_repeated_detection(
+      positioner, sensors, add(std::move(lights)),
+      [&](const auto& level_from_camera) { return add(detect(level_from_camera)); });
+  return std::move(repetitions[found.repetition]);
 }
 
 bool has_detections(const std::vector<Frame>& frames) {
@@ -686,29 +654,17 @@ bool has_detections(const std::vector<Frame>& frames) {
 LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, LocateInput input,
                                        const FrontendOptions& options,
                                        const IntakeProgress& progress) {
-  const LampIntake intake(images, use, options);
+  LampIntake intake(images, use, options);
   if (!input.calibration.camera.readout)
     input.calibration.camera.readout = intake.readout_direction();
-  const auto files = list_lamp_images(images.images);
-  Observations seen = intake.detect_lamps_in_all_images(files, progress);
+  const Positioner positioner(input.lamps, input.calibration, input.positioner_options);
+  intake.set_repetition(
+      [&](const std::string& image, std::vector<Light> lights, const LightsInPlane& detect) {
+        return repeat_detection_if_tilted(input, positioner, image, std::move(lights), detect);
+      });
+  Observations seen = intake.detect_lamps_in_all_images(list_lamp_images(images.images), progress);
   check_any_lamp_identified(images, seen);
   input.frames = collect_lamp_frames_of_kept_images(seen.images);
-  const LampIntake without_pictures = intake.copy_intake_with_annotation_folder({});
-  std::map<std::string, Observation> latest;
-  const LevelRotations levels =
-      redetect_lamps_until_tilt_converges(input, [&](const LevelRotations& tilted) {
-        const Observations repeated = detect_in_images_again(without_pictures, files, tilted);
-        for (const Observation& image : repeated.images) {
-          if (image.is_image_kept()) latest.insert_or_assign(image.image_file_name(), image);
-        }
-        return collect_lamp_frames_of_kept_images(repeated.images);
-      });
-  for (Observation& image : seen.images) {
-    const auto repeated = latest.find(image.image_file_name());
-    if (levels.contains(image.image_file_name()) && repeated != latest.end())
-      image = repeated->second;
-  }
-  if (!options.annotate.empty()) detect_in_images_again(intake, files, levels);
   LocateResult result;
   if (has_detections(input.frames)) {
     seen.failure.reset();
@@ -723,10 +679,6 @@ LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, L
   }
   result.observations = std::move(seen);
   return result;
-}
-
-LevelRotations redetect_lamps_until_tilt_converges(LocateInput& input, const Redetector& redetect) {
-  return TiltedCaptures(input, redetect).iterate_until_tilt_converges();
 }
 
 }  // namespace vlp

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -96,7 +95,7 @@ LocateResult locate_camera_from_detections(const LocateInput& input);
 
 /// Detects the lamps in images (detect_lamps_in_images()) and locates the camera of each image.
 /// `input` holds everything except the frames. If the tilt of a camera is estimated, its lamps are
-/// detected again in the plane that is level by its fix (redetect_lamps_until_tilt_converges()).
+/// detected again in the plane that is level by its fix (locate_with_repeated_detection()).
 ///
 /// Skipped images and remarks of the intake are part of the result. It fails as
 /// locate_camera_from_detections() does, or if no lamp is identified.
@@ -104,20 +103,5 @@ LocateResult locate_camera_from_detections(const LocateInput& input);
 LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, LocateInput input,
                                        const FrontendOptions& options,
                                        const IntakeProgress& progress = {});
-
-/// Function that detects the lamps of the named images again, in their level planes. Returns a
-/// frame per image, by name.
-using Redetector = std::function<std::vector<Frame>(const LevelRotations&)>;
-
-/// Repeats the detection of lamps in captures whose tilt is estimated, in the plane that is level
-/// by the fix. Stops when the fix moves by less than a tenth of its standard deviations.
-///
-/// Reason: lamps are discs in the level plane, and centers detected in another plane are biased. If
-/// the tilt may be large or no fix exists yet, the first repetition fits ellipses. They are close
-/// to the image of a disc in any plane. A fix that a detection in its plane does not confirm is
-/// discarded. A capture without a fix either way keeps the detection with more lamps.
-///
-/// Replaces the frames of `input`. Returns the level rotations of the frames that changed.
-LevelRotations redetect_lamps_until_tilt_converges(LocateInput& input, const Redetector& redetect);
 
 }  // namespace vlp

@@ -119,16 +119,16 @@ std::vector<double> compute_squared_residuals_of_lights(const GroupedLights& ima
   const FrameObservations frame = make_frame(image, assigned, lamps, lens, tolerance.sd_fraction);
   if (frame.size < kMinLights) return squares;
   BodyPrior prior;
-  prior.inclination_sd_rad = kLeanSd_rad;
+  prior.set_sd(kBodyRoll, kLeanSd_rad);
   FrameObservations agreeing = frame;
   const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
-  const auto [status, fix] =
+  const auto found =
       estimate_body_state_robust(agreeing, {no_arm_m, prior}, tolerance.max_residual_fraction);
-  if (!has_pose(status) || agreeing.size < std::min(frame.size, kMinMajority)) return squares;
-  const auto& [roll_rad, pitch_rad] = fix.state.motion.inclination;
+  if (!has_pose(found.status) || agreeing.size < std::min(frame.size, kMinMajority)) return squares;
+  const auto& [roll_rad, pitch_rad] = found.fix.state.motion.inclination;
   const double lean_square = (roll_rad * roll_rad + pitch_rad * pitch_rad) /
                              (kLeanSd_rad * kLeanSd_rad) / static_cast<double>(agreeing.size);
-  const EvaluatedState body(fix.state);
+  const EvaluatedState body(found.fix.state);
   for (std::size_t i = 0; i < frame.size; ++i) {
     const LampObservation& seen = frame.sightings[i];
     const Eigen::Vector3d lamp_in_body = body.lamp_position_in_body(seen.lamp_m, 0);

@@ -56,19 +56,21 @@ struct Errors {
     ++fixes;
     const Pose pose = truth.camera_pose_at(0);
     Eigen::Vector4d error;
-    error << fix.estimate.pose.position_m - pose.position_m,
-        wrap_angle_rad(fix.estimate.pose.yaw_rad - pose.yaw_rad);
+    error << fix.state.pose.position_m - pose.position_m,
+        wrap_angle_rad(fix.state.pose.yaw_rad - pose.yaw_rad);
     horizontal += error.head<2>().squaredNorm();
     height += error[2] * error[2];
     yaw += error[3] * error[3];
-    const Eigen::Matrix4d covariance = fix.estimate.covariance;
+    const Eigen::Matrix4d covariance = fix.pose_covariance();
     pose_chi_squared += error.dot(covariance.ldlt().solve(error)) / 4;
-    if (!fix.body || fix.body->covariance(kBodyVelocity, kBodyVelocity) == 0) return;
-    const Eigen::Vector2d off = fix.body->velocity_m_per_s - truth.camera_velocity_m_per_s();
+    if (fix.covariance(kBodyVelocity, kBodyVelocity) == 0) return;
+    const Eigen::Vector2d true_velocity =
+        Eigen::Rotation2Dd(-pose.yaw_rad) * truth.camera_velocity_m_per_s();
+    const Eigen::Vector2d off = fix.state.motion.velocity_m_per_s - true_velocity;
     const Eigen::Matrix2d velocity_covariance =
-        fix.body->covariance.block<2, 2>(kBodyVelocity, kBodyVelocity);
+        fix.covariance.block<2, 2>(kBodyVelocity, kBodyVelocity);
     velocity += off.squaredNorm() / 2;
-    along += off.dot(truth.camera_velocity_m_per_s().normalized());
+    along += off.dot(true_velocity.normalized());
     chi_squared += off.dot(velocity_covariance.ldlt().solve(off)) / 2;
   }
   double rms(double sum) const { return std::sqrt(sum / fixes); }
@@ -147,8 +149,8 @@ class Trials {
         if (!fix.has_succeeded()) continue;
         // Discs are circles in the level plane: detected again with the estimated tilt.
         DetectorCamera leaning = make_detector_camera(calibration);
-        leaning.level_from_camera =
-            level_rotation_from_inclination(fix.body->inclination) * leaning.level_from_camera;
+        leaning.level_from_camera = level_rotation_from_inclination(fix.state.motion.inclination) *
+                                    leaning.level_from_camera;
         const auto seen_again = detections_in(renderer, LightDetector(lamps, leaning), shot);
         if (seen_again.size() >= 4)
           again.add(positioner.compute_position_fix(seen_again, in_hand), motion);
@@ -263,9 +265,9 @@ class Trials {
     for (const DrivenCapture& seen : captures) {
       const KnownMotion known = KnownMotion::make_motion_prior_from_limits(2.5, rad_from_deg(180));
       BodyPrior prior;
-      prior.velocity_sd_m_per_s = odometry ? 0.01 * seen.speed_m_per_s : known.velocity_sd_m_per_s;
-      prior.yaw_rate_sd_rad_per_s =
-          odometry ? 0.01 * seen.turn_rate_rad_per_s : known.yaw_rate_sd_rad_per_s;
+      prior.set_sd(kBodyVelocity, odometry ? 0.01 * seen.speed_m_per_s : known.velocity_sd_m_per_s);
+      prior.set_sd(kBodyYawRate,
+                   odometry ? 0.01 * seen.turn_rate_rad_per_s : known.yaw_rate_sd_rad_per_s);
       const auto limit = compute_pose_crlb(seen.lamps_m, lens, camera_from_level, seen.pose,
                                            noise_px, prior, clock);
       if (!limit) continue;

@@ -81,7 +81,7 @@ void fix_with_the_common_part(benchmark::State& state) {
   scene.detections = with_noise(seen_from(rig, 0.1), random);
   const Positioner positioner(rig.map, rig.calibration);
   const Fix once = positioner.compute_position_fix(scene.detections);
-  if (!once.has_succeeded() || once.noise_covariance == once.estimate.covariance) {
+  if (!once.has_succeeded() || once.noise_covariance == once.covariance) {
     throw std::logic_error("no fix, or one without the common part");
   }
   for (auto _ : state) benchmark::DoNotOptimize(positioner.compute_position_fix(scene.detections));

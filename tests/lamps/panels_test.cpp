@@ -214,8 +214,7 @@ TEST(Positioner, ComputesFixWithinTwoMillimetersFromPanels) {
     if (detections.size() < 3) continue;
     const Fix fix = positioner.compute_position_fix(detections);
     ASSERT_EQ(fix.status, FixStatus::ok) << i;
-    EXPECT_LT((fix.estimate.pose.position_m - shot.motion.camera_pose_at(0).position_m).norm(),
-              0.002)
+    EXPECT_LT((fix.state.pose.position_m - shot.motion.camera_pose_at(0).position_m).norm(), 0.002)
         << i;
     ++fixes;
   }

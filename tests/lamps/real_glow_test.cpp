@@ -65,7 +65,7 @@ TEST(PositionerOnRealGlows, ComputesTrueDistanceWithinTwoCentimetersFromFiveLamp
   const Fix fix = Positioner(result.map, result.calibration).compute_position_fix(detections);
   ASSERT_TRUE(fix.has_succeeded()) << describe_fix_status(fix.status);
   EXPECT_EQ(fix.lamps, 5);
-  const double distance_m = 2.46 - fix.estimate.pose.position_m.z();
+  const double distance_m = 2.46 - fix.state.pose.position_m.z();
   EXPECT_NEAR(distance_m, 2.45, 0.02);
   EXPECT_LT(fix.residual_px * distance_m / kFocal_px, 2e-3);
 }
@@ -124,13 +124,12 @@ TEST(PositionerOnRealGlows, PositionMatchesOpenCvForFiveLamps) {
   const Fix fix =
       Positioner(result.map, result.calibration).compute_position_fix(detections, sensors);
   ASSERT_TRUE(fix.has_succeeded()) << describe_fix_status(fix.status);
-  ASSERT_TRUE(fix.body);
   const auto places_m = opencv_places(result, detections, cv::SOLVEPNP_SQPNP);
   ASSERT_EQ(places_m.size(), 1U);
-  const double off_m = (fix.estimate.pose.position_m - places_m[0]).norm();
+  const double off_m = (fix.state.pose.position_m - places_m[0]).norm();
   std::printf("lean %.2f %.2f degrees, %.2f mm from OpenCV's PnP\n",
-              fix.body->inclination.roll_rad * 180 / M_PI,
-              fix.body->inclination.pitch_rad * 180 / M_PI, 1e3 * off_m);
+              fix.state.motion.inclination.roll_rad * 180 / M_PI,
+              fix.state.motion.inclination.pitch_rad * 180 / M_PI, 1e3 * off_m);
   EXPECT_LT(off_m, 0.01 * 2.45);
 }
 
@@ -157,7 +156,7 @@ TEST(PositionerOnRealGlows, PositionMatchesOpenCvForThreeLampsWithGivenHeight) {
     std::printf("OpenCV's at %.4f %.4f %.4f m, ours %s\n", place_m.x(), place_m.y(), place_m.z(),
                 fix_status_name(fix.status).data());
     if (!fix.has_succeeded()) continue;
-    EXPECT_LT((fix.estimate.pose.position_m - place_m).norm(), 0.01 * 2.35);
+    EXPECT_LT((fix.state.pose.position_m - place_m).norm(), 0.01 * 2.35);
     ++matched;
   }
   EXPECT_GT(matched, 0);

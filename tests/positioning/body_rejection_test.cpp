@@ -54,8 +54,8 @@ class PositionerMovingOrTiltedCamera : public testing::Test {
   void expect_truth(const Fix& fix) const {
     ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     for (int i = 0; i < 3; ++i) {
-      EXPECT_NEAR(fix.estimate.pose.position_m[i], rig.body.pose.position_m[i],
-                  5 * std::sqrt(fix.estimate.covariance(i, i)));
+      EXPECT_NEAR(fix.state.pose.position_m[i], rig.body.pose.position_m[i],
+                  5 * std::sqrt(fix.pose_covariance()(i, i)));
     }
   }
 };
@@ -87,7 +87,7 @@ TEST(IsBodyPositionDetermined, LimitsSdByMeanDistanceToLamps) {
   frame.add_current({{0, 3, 0}, {}, {}, 1, 0}, 2, 1);
   BodyFix fix;
   BodyPrior at_rest, moving;
-  moving.velocity_sd_m_per_s = 1;
+  moving.set_sd(kBodyVelocity, 1);
   for (const auto& [sd_m, determined, determined_if_moving] : {std::tuple(0.49, true, true),
                                                                {0.51, true, false},
                                                                {1.99, true, false},
@@ -111,9 +111,8 @@ TEST_F(PositionerMovingOrTiltedCamera, EqualsFixWithoutMotionWhenMotionIsExactly
   const auto detections = seen();
   const Fix with = locate(detections, standing), without = locate(detections, {});
   ASSERT_TRUE(with.has_succeeded());
-  EXPECT_EQ(with.estimate.pose.position_m, without.estimate.pose.position_m);
-  EXPECT_EQ(with.estimate.covariance, without.estimate.covariance);
-  EXPECT_FALSE(with.body.has_value());
+  EXPECT_EQ(with.state.pose.position_m, without.state.pose.position_m);
+  EXPECT_EQ(with.pose_covariance(), without.pose_covariance());
 }
 
 TEST_F(PositionerMovingOrTiltedCamera, ReturnsRowTimeUnknownForMotionWithoutReadoutTiming) {
@@ -171,7 +170,7 @@ TEST_F(PositionerMovingOrTiltedCamera, ReturnsUndeterminedForTwoLampsWithFreeTil
   EXPECT_EQ(locate(detections, held()).status, FixStatus::undetermined);
   const Fix fix = locate(detections, driving());
   expect_truth(fix);
-  EXPECT_GT(std::sqrt(fix.estimate.covariance(2, 2)), 0.003);
+  EXPECT_GT(std::sqrt(fix.pose_covariance()(2, 2)), 0.003);
 }
 
 TEST_F(PositionerMovingOrTiltedCamera, ReturnsUndeterminedForCollinearLampsWithFreeTilt) {
@@ -390,7 +389,7 @@ TEST_F(PositionerMovingOrTiltedCamera, CountsLampsAndSightingsOfEarlierFrames) {
   EXPECT_EQ(fix.sightings, 4 + 7);
   EXPECT_EQ(fix.unknown_lamps, 1);
   EXPECT_NEAR(fix.redundancy, 2 * 11 - 7, 0.1);
-  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-8));
+  EXPECT_THAT(fix.state.pose.position_m, IsNear(rig.body.pose.position_m, 1e-8));
 }
 
 TEST_F(PositionerMovingOrTiltedCamera, PositionAndYawRateMatchTruthWithEarlierFrame) {
@@ -402,9 +401,8 @@ TEST_F(PositionerMovingOrTiltedCamera, PositionAndYawRateMatchTruthWithEarlierFr
   sensors.motion = KnownMotion{{0, 0}, 0, 1e3, 1e3};
   const Fix fix = rig.positioner().compute_position_fix(now, sensors, {&earlier, 1});
   ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
-  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-7));
-  ASSERT_TRUE(fix.body);
-  EXPECT_NEAR(fix.body->yaw_rate_rad_per_s, 0.5, 1e-5);
+  EXPECT_THAT(fix.state.pose.position_m, IsNear(rig.body.pose.position_m, 1e-7));
+  EXPECT_NEAR(fix.state.motion.yaw_rate_rad_per_s, 0.5, 1e-5);
 }
 
 }  // namespace

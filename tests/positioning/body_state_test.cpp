@@ -63,7 +63,7 @@ class BodyStateEstimation : public testing::Test {
 
   BodyPrior make_prior() const {
     BodyPrior known;
-    known.mean = truth.motion;
+    known.mean.motion = truth.motion;
     return known;
   }
   /// Returns the observations with errors of up to `error_px`.
@@ -85,13 +85,14 @@ class BodyStateEstimation : public testing::Test {
     return frame;
   }
   void estimate_all_states() {
-    prior.velocity_sd_m_per_s = 0.2;
-    prior.mean.velocity_m_per_s += Eigen::Vector2d(0.1, 0.05);
-    prior.yaw_rate_sd_rad_per_s = 0.3;
-    prior.mean.yaw_rate_rad_per_s -= 0.2;
-    prior.inclination_sd_rad = 0.02;
-    prior.mean.inclination.roll_rad += 0.01;
-    prior.height = KnownHeight{truth.pose.position_m.z() + 0.002, 0.003};
+    prior.set_sd(kBodyVelocity, 0.2);
+    prior.mean.motion.velocity_m_per_s += Eigen::Vector2d(0.1, 0.05);
+    prior.set_sd(kBodyYawRate, 0.3);
+    prior.mean.motion.yaw_rate_rad_per_s -= 0.2;
+    prior.set_sd(kBodyRoll, 0.02);
+    prior.mean.motion.inclination.roll_rad += 0.01;
+    prior.mean.pose.position_m.z() = truth.pose.position_m.z() + 0.002;
+    prior.set_sd(kBodyZ, 0.003);
   }
   double compute_chi_squared(const BodyState& state) const {
     return compute_body_state_chi_squared(seen, {kArm_m, prior}, state).value_or(-1);
@@ -225,7 +226,7 @@ TEST_F(BodyStateEstimation, RedundancyIsExpectedChiSquaredOfPixels) {
 
 TEST_F(BodyStateEstimation, StatesWithoutPriorSdStayAtTheirMean) {
   seen = observe(0.3);
-  prior.yaw_rate_sd_rad_per_s = 0.3;
+  prior.set_sd(kBodyYawRate, 0.3);
   const auto fix = estimate_body_state(seen, {kArm_m, prior}, truth);
   ASSERT_TRUE(fix);
   EXPECT_NE(fix->state.motion.yaw_rate_rad_per_s, truth.motion.yaw_rate_rad_per_s);
@@ -253,12 +254,12 @@ class EstimateBodyStateFromThreeLamps : public BodyStateEstimation {
 
   void SetUp() override {
     truth.motion = {{0, 0}, 0, truth.motion.inclination};
-    prior.mean = truth.motion;
+    prior.mean.motion = truth.motion;
     seen = observe(0);
     seen.erase(seen.begin(), seen.begin() + 3);
     for (LampObservation& observation : seen) observation.whitened_pixel_from_ray *= 1e4;
     constexpr double unknown = 1e3;
-    prior.inclination_sd_rad = unknown;
+    prior.set_sd(kBodyRoll, unknown);
     const InitialStates states =
         compute_initial_body_states_from_three_lamps(make_frame(), {0, 1, 2}, {kArm_m, prior});
     ASSERT_GE(states.count, 2);
@@ -272,7 +273,8 @@ class EstimateBodyStateFromThreeLamps : public BodyStateEstimation {
   /// the difference to the next one. This difference is `gap_in_sds` standard deviations.
   FixStatus find_status(double height_in_gaps, double gap_in_sds) {
     const double gap_m = heights_m[1] - heights_m[0];
-    prior.height = KnownHeight{heights_m[0] - height_in_gaps * gap_m, gap_m / gap_in_sds};
+    prior.mean.pose.position_m.z() = heights_m[0] - height_in_gaps * gap_m;
+    prior.set_sd(kBodyZ, gap_m / gap_in_sds);
     return estimate_body_state_from_all_lamps(make_frame(), {kArm_m, prior}).status;
   }
 };
@@ -365,7 +367,7 @@ TEST_F(EstimateBodyStateRobust, RejectsMisidentifiedLampBeyondResidualLimit) {
 TEST_F(EstimateBodyStateRobust, RejectsMisidentifiedLampOfDrivingCamera) {
   truth.motion.velocity_m_per_s = {2, -1.5};
   seen = observe(0);
-  prior.velocity_sd_m_per_s = 1;
+  prior.set_sd(kBodyVelocity, 1);
   displace(3, {160, 120});
   FrameObservations frame = make_frame();
   frame.nearest_m.fill(0.08);
@@ -391,23 +393,24 @@ TEST_F(EstimateBodyStateRobust, ReturnsInconsistentBeyondFiveSdsOfPrior) {
   for (const auto& [sds, status] :
        {std::pair(4.9, FixStatus::ok), {5.1, FixStatus::inconsistent}}) {
     BodyPrior moving = prior;
-    moving.velocity_sd_m_per_s = 0.05;
-    moving.mean.velocity_m_per_s.y() = truth.motion.velocity_m_per_s.y() - sds * 0.05;
+    moving.set_sd(kBodyVelocity, 0.05);
+    moving.mean.motion.velocity_m_per_s.y() = truth.motion.velocity_m_per_s.y() - sds * 0.05;
     FrameObservations frame = make_frame();
     EXPECT_EQ(estimate_body_state_robust(frame, {kArm_m, moving}, kMaxResidualFraction).status,
               status)
         << "velocity, " << sds;
     BodyPrior rotating = prior;
-    rotating.yaw_rate_sd_rad_per_s = 0.1;
-    rotating.mean.yaw_rate_rad_per_s = truth.motion.yaw_rate_rad_per_s + sds * 0.1;
+    rotating.set_sd(kBodyYawRate, 0.1);
+    rotating.mean.motion.yaw_rate_rad_per_s = truth.motion.yaw_rate_rad_per_s + sds * 0.1;
     frame = make_frame();
     EXPECT_EQ(estimate_body_state_robust(frame, {kArm_m, rotating}, kMaxResidualFraction).status,
               status)
         << "yaw rate, " << sds;
     BodyPrior tilted = prior;
-    tilted.inclination_sd_rad = 0.01;
-    tilted.mean.inclination.roll_rad = truth.motion.inclination.roll_rad - 0.6 * sds * 0.01;
-    tilted.mean.inclination.pitch_rad = truth.motion.inclination.pitch_rad + 0.8 * sds * 0.01;
+    tilted.set_sd(kBodyRoll, 0.01);
+    tilted.mean.motion.inclination.roll_rad = truth.motion.inclination.roll_rad - 0.6 * sds * 0.01;
+    tilted.mean.motion.inclination.pitch_rad =
+        truth.motion.inclination.pitch_rad + 0.8 * sds * 0.01;
     frame = make_frame();
     EXPECT_EQ(estimate_body_state_robust(frame, {kArm_m, tilted}, kMaxResidualFraction).status,
               status)

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <array>
 
 #include "geometry/angles.h"
@@ -13,7 +14,7 @@ namespace vlp {
 namespace {
 
 Sighting seen(const Eigen::Vector3d& lamp_m, const Pose& pose) {
-  return {lamp_m, project_lamp_to_normalized_point(LevelPose(pose), lamp_m)};
+  return {lamp_m, level_point_from_world(pose, lamp_m).hnormalized()};
 }
 
 Pose random_pose(Random& random) {
@@ -52,9 +53,9 @@ TEST(ComputeTwoLampPoses, ContainsTruePoseForLampsAtDifferentHeights) {
     const Pose& nearest = fix.poses[first ? 0 : static_cast<std::size_t>(fix.count - 1)];
     EXPECT_LT((nearest.position_m - truth.position_m).norm(), 1e-6);
     for (int k = 0; k < fix.count; ++k) {
-      const LevelPose pose(fix.poses[static_cast<std::size_t>(k)]);
-      EXPECT_THAT(project_lamp_to_normalized_point(pose, a.lamp_m), IsNear(a.z, 1e-9));
-      EXPECT_THAT(project_lamp_to_normalized_point(pose, b.lamp_m), IsNear(b.z, 1e-9));
+      const Pose& pose = fix.poses[static_cast<std::size_t>(k)];
+      EXPECT_THAT(seen(a.lamp_m, pose).z, IsNear(a.z, 1e-9));
+      EXPECT_THAT(seen(b.lamp_m, pose).z, IsNear(b.z, 1e-9));
     }
   }
   EXPECT_GT(doubles, 10) << "the ambiguous case was not met";
@@ -66,9 +67,8 @@ TEST(ComputeTwoLampPoses, ReturnsOnePoseWhereTwoPosesCoincide) {
   const TwoLampPoses fix = compute_two_lamp_poses(a, b);
   ASSERT_EQ(fix.count, 1);
   EXPECT_NEAR(fix.poses[0].position_m.z(), 2, 1e-12);
-  const LevelPose pose(fix.poses[0]);
-  EXPECT_THAT(project_lamp_to_normalized_point(pose, a.lamp_m), IsNear(a.z, 1e-12));
-  EXPECT_THAT(project_lamp_to_normalized_point(pose, b.lamp_m), IsNear(b.z, 1e-12));
+  EXPECT_THAT(seen(a.lamp_m, fix.poses[0]).z, IsNear(a.z, 1e-12));
+  EXPECT_THAT(seen(b.lamp_m, fix.poses[0]).z, IsNear(b.z, 1e-12));
 }
 
 TEST(ComputeTwoLampPoses, ReturnsNoPoseForCoincidentImagePoints) {

@@ -19,9 +19,9 @@ class NormalizedErrors {
   void add(const Fix& fix, const Pose& truth) {
     ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
     Eigen::Vector4d error;
-    error << fix.estimate.pose.position_m - truth.position_m,
-        wrap_angle_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
-    const Eigen::Matrix4d covariance = fix.estimate.covariance;
+    error << fix.state.pose.position_m - truth.position_m,
+        wrap_angle_rad(fix.state.pose.yaw_rad - truth.yaw_rad);
+    const Eigen::Matrix4d covariance = fix.pose_covariance();
     joint_ += error.dot(covariance.ldlt().solve(error)) / 4;
     each_ += error.array().square() / covariance.diagonal().array();
     ++count_;
@@ -200,8 +200,8 @@ struct ThreeLampErrors {
       ambiguous += fix.status == FixStatus::ambiguous;
       if (!fix.has_succeeded()) continue;
       ++fixes;
-      const Eigen::Vector3d error = fix.estimate.pose.position_m - rig.body.pose.position_m;
-      const Eigen::Array3d variances = fix.estimate.covariance.diagonal().head<3>().array();
+      const Eigen::Vector3d error = fix.state.pose.position_m - rig.body.pose.position_m;
+      const Eigen::Array3d variances = fix.pose_covariance().diagonal().head<3>().array();
       beyond_six_sds += (error.array().square() > 36 * variances).any();
     }
   }

@@ -23,33 +23,23 @@ class CommonErrorsTest : public testing::Test {
  protected:
   StatedRig rig;
 
-  /// States of a fix; without a body estimate only X, Y, Z and yaw, and zeros.
   using States = Eigen::Vector<double, kBodyStates>;
   static States to_states(const Fix& fix) {
-    States states = States::Zero();
-    states.head<4>() << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
-    if (const auto& body = fix.body) {
-      states.tail<5>() << body->velocity_m_per_s, body->yaw_rate_rad_per_s,
-          body->inclination.roll_rad, body->inclination.pitch_rad;
-    }
+    const auto& [pose, motion] = fix.state;
+    States states;
+    states << pose.position_m, pose.yaw_rad, motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
+        motion.inclination.roll_rad, motion.inclination.pitch_rad;
     return states;
   }
 
   void expect_common(const Fix& fix, const Eigen::MatrixXd& by_parameters,
                      const MatrixX& covariance) const {
     const Eigen::MatrixXd expected = by_parameters * covariance * by_parameters.transpose();
-    const Eigen::Matrix4d of_pose = expected.topLeftCorner<4, 4>();
-    EXPECT_THAT(fix.estimate.covariance - fix.noise_covariance,
-                IsNear(of_pose, 1e-4 * of_pose.cwiseAbs().maxCoeff()));
-    if (!fix.body) return;
-    EXPECT_EQ(fix.estimate.covariance, Matrix4(fix.body->covariance.topLeftCorner<4, 4>()));
-    EXPECT_EQ(fix.noise_covariance, Matrix4(fix.body->noise_covariance.topLeftCorner<4, 4>()));
     // Each state in its standard deviation, which given states lack.
     const Eigen::VectorXd sd = expected.diagonal().cwiseSqrt();
     const Eigen::VectorXd inverse_sd =
         (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Ones(kBodyStates));
-    const Eigen::MatrixXd off =
-        fix.body->covariance - fix.body->noise_covariance - BodyCovariance(expected);
+    const Eigen::MatrixXd off = fix.covariance - fix.noise_covariance - BodyCovariance(expected);
     EXPECT_THAT(inverse_sd.asDiagonal() * off * inverse_sd.asDiagonal(),
                 IsNear(Eigen::MatrixXd::Zero(kBodyStates, kBodyStates), 1e-3));
   }
@@ -98,12 +88,11 @@ TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
   const Fix fix =
       Positioner(rig.map, rig.calibration, options).compute_position_fix(detections, known);
   ASSERT_TRUE(fix.has_succeeded());
-  ASSERT_EQ(fix.body.has_value(), known.motion || known.inclination_sigma_rad > 0);
   expect_common(fix, by_parameters, adjustment.covariance);
   rig.calibration.adjustment.reset();
   const Fix noise =
       Positioner(rig.map, rig.calibration, options).compute_position_fix(detections, known);
-  EXPECT_EQ(noise.estimate.covariance, noise.noise_covariance);
+  EXPECT_EQ(noise.covariance, noise.noise_covariance);
   EXPECT_THAT(fix.noise_covariance, IsNear(noise.noise_covariance, 1e-15));
 }
 
@@ -164,7 +153,7 @@ TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUnce
   }
   const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
   ASSERT_TRUE(fix.has_succeeded());
-  EXPECT_GT(fix.estimate.covariance(0, 0), 2 * fix.noise_covariance(0, 0));
+  EXPECT_GT(fix.pose_covariance()(0, 0), 2 * fix.noise_covariance(0, 0));
   expect_common(fix, by_parameters, covariance);
 }
 
@@ -191,7 +180,7 @@ TEST_F(CommonErrorsTest, FixCovarianceIncludesSurveySdOfLamps) {
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(seen_from(rig, 0.1));
   ASSERT_TRUE(fix.has_succeeded());
-  const Matrix4 common = fix.estimate.covariance - fix.noise_covariance;
+  const Matrix4 common = (fix.covariance - fix.noise_covariance).topLeftCorner<4, 4>();
   // Eight lamps of 2 mm around the camera: slightly more than 2 / sqrt(8).
   EXPECT_NEAR(std::sqrt(common(0, 0)), 0.00075, 0.00008);
 }
@@ -214,8 +203,8 @@ TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByDispersionLampsWithZeroJacobi
             large.num_shared_errors() + 3 * std::ssize(rig.map.lamps));
   const Fix with = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
   ASSERT_TRUE(with.has_succeeded() && without.has_succeeded());
-  const double scale = with.estimate.covariance.norm();
-  EXPECT_THAT(without.estimate.covariance, IsNear(with.estimate.covariance, 1e-12 * scale));
+  const double scale = with.pose_covariance().norm();
+  EXPECT_THAT(without.pose_covariance(), IsNear(with.pose_covariance(), 1e-12 * scale));
   EXPECT_TRUE(small.are_any_errors_known() &&
               small.isolate_error_source(CommonErrorSource::lamps).are_any_errors_known());
 }
@@ -255,7 +244,7 @@ TEST_F(CommonErrorsTest, PositionFixRejectsLampMovedFarBeyondItsSd) {
       ASSERT_TRUE(fix.has_succeeded());
       EXPECT_EQ(fix.rejected_lamps, 1) << off_m << " m, lamp " << moved + 1;
       EXPECT_EQ(fix.rejected_ids[0], static_cast<int>(moved) + 1);
-      EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 0.001));
+      EXPECT_THAT(fix.state.pose.position_m, IsNear(rig.camera.position_m, 0.001));
     }
   }
 }

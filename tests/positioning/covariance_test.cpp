@@ -50,11 +50,11 @@ class FixCovariance : public testing::TestWithParam<std::size_t> {
     const auto exact = seen_from(rig, sigma_px);
     const Fix reported = positioner.compute_position_fix(exact, sensors);
     ASSERT_TRUE(reported.has_succeeded());
-    Scatter scatter(rig.camera, reported.estimate.covariance);
+    Scatter scatter(rig.camera, reported.pose_covariance());
     for (int i = 0; i < kDraws; ++i) {
       const Fix fix = positioner.compute_position_fix(with_noise(exact, random), sensors);
       ASSERT_TRUE(fix.has_succeeded());
-      scatter.add(fix.estimate.pose);
+      scatter.add(fix.state.pose);
     }
     expect_efficient(scatter);
     EXPECT_LT(scatter.bias().cwiseAbs().maxCoeff(), 5) << scatter.bias().transpose();
@@ -68,7 +68,7 @@ TEST_P(FixCovariance, EqualsCramerRaoBound) {
       Positioner(rig.map, rig.calibration).compute_position_fix(seen_from(rig, sigma_px));
   ASSERT_TRUE(fix.has_succeeded());
   const Eigen::Matrix4d limit = compute_limit(rig, sigma_px);
-  EXPECT_LT((fix.estimate.covariance - limit).norm(), 1e-6 * limit.norm());
+  EXPECT_LT((fix.pose_covariance() - limit).norm(), 1e-6 * limit.norm());
 }
 
 TEST_P(FixCovariance, MatchesScatterOfLevelCamera) { expect_consistent(0.2); }
@@ -92,10 +92,10 @@ TEST(FixCovariance, MatchesScatterWhenLampsHaveDifferentNoise) {
   exact[3].sigma_px = 0.3;
   const Fix reported = positioner.compute_position_fix(exact);
   ASSERT_TRUE(reported.has_succeeded());
-  Scatter scatter(rig.camera, reported.estimate.covariance);
+  Scatter scatter(rig.camera, reported.pose_covariance());
   Random random(12);
   for (int i = 0; i < kDraws; ++i) {
-    scatter.add(positioner.compute_position_fix(with_noise(exact, random)).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random)).state.pose);
   }
   expect_efficient(scatter);
 }
@@ -108,13 +108,13 @@ TEST(FixCovariance, MatchesScatterWithInclinationSensorNoise) {
   const double sigma_rad = 0.002;
   const Fix reported = positioner.compute_position_fix(exact, {rig.inclination, sigma_rad, {}});
   ASSERT_TRUE(reported.has_succeeded());
-  Scatter scatter(rig.camera, reported.estimate.covariance);
+  Scatter scatter(rig.camera, reported.pose_covariance());
   Random random(13);
   for (int i = 0; i < kDraws; ++i) {
     const Inclination read{rig.inclination->roll_rad + sigma_rad * random.normal(),
                            rig.inclination->pitch_rad + sigma_rad * random.normal()};
     scatter.add(positioner.compute_position_fix(with_noise(exact, random), {read, sigma_rad, {}})
-                    .estimate.pose);
+                    .state.pose);
   }
   expect_efficient(scatter);
   EXPECT_NEAR(scatter.share_beyond_95(), 0.05, kShareTolerance);
@@ -128,10 +128,10 @@ TEST(FixCovariance, MatchesScatterOfRobotPoseWithCameraMount) {
   const auto exact = seen_from(rig, 0.2);
   const Fix truth = positioner.compute_position_fix(exact);
   ASSERT_TRUE(truth.has_succeeded());
-  Scatter scatter(truth.estimate.pose, truth.estimate.covariance);
+  Scatter scatter(truth.state.pose, truth.pose_covariance());
   Random random(14);
   for (int i = 0; i < kDraws; ++i) {
-    scatter.add(positioner.compute_position_fix(with_noise(exact, random)).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random)).state.pose);
   }
   expect_efficient(scatter);
   EXPECT_NEAR(scatter.share_beyond_95(), 0.05, kShareTolerance);
@@ -146,12 +146,12 @@ TEST(FixCovariance, MatchesScatterWithInclinationNoiseAndMountArm) {
   const double sigma_rad = 0.005;
   const Fix truth = positioner.compute_position_fix(exact, {Inclination{0, 0}, sigma_rad, {}});
   ASSERT_TRUE(truth.has_succeeded());
-  Scatter scatter(truth.estimate.pose, truth.estimate.covariance);
+  Scatter scatter(truth.state.pose, truth.pose_covariance());
   Random random(17);
   for (int i = 0; i < kDraws; ++i) {
     const Inclination read{sigma_rad * random.normal(), sigma_rad * random.normal()};
     scatter.add(positioner.compute_position_fix(with_noise(exact, random), {read, sigma_rad, {}})
-                    .estimate.pose);
+                    .state.pose);
   }
   expect_efficient(scatter);
 }
@@ -165,14 +165,14 @@ TEST(FixCovariance, MatchesScatterForOneLampWithInclinationNoise) {
   const Fix reported =
       positioner.compute_position_fix(exact, {Inclination{0, 0}, sigma_rad, known});
   ASSERT_TRUE(reported.has_succeeded());
-  Eigen::Matrix4d covariance = reported.estimate.covariance;
+  Eigen::Matrix4d covariance = reported.pose_covariance();
   covariance.bottomRightCorner<2, 2>().setIdentity();
   Scatter scatter(rig.camera, covariance);
   Random random(18);
   for (int i = 0; i < kDraws; ++i) {
     const Inclination read{sigma_rad * random.normal(), sigma_rad * random.normal()};
     scatter.add(positioner.compute_position_fix(with_noise(exact, random), {read, sigma_rad, known})
-                    .estimate.pose);
+                    .state.pose);
   }
   EXPECT_LT(scatter.excess().head<2>().cwiseAbs().maxCoeff(), kScatterTolerance);
 }
@@ -186,10 +186,10 @@ TEST(FixCovariance, MatchesScatterWithStereographicLens) {
   const auto exact = seen_from(rig, 0.1);
   const Fix reported = positioner.compute_position_fix(exact);
   ASSERT_TRUE(reported.has_succeeded());
-  Scatter scatter(rig.camera, reported.estimate.covariance);
+  Scatter scatter(rig.camera, reported.pose_covariance());
   Random random(19);
   for (int i = 0; i < kDraws; ++i) {
-    scatter.add(positioner.compute_position_fix(with_noise(exact, random)).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random)).state.pose);
   }
   expect_efficient(scatter);
 }
@@ -201,14 +201,14 @@ TEST(FixCovariance, MatchesScatterForOneLampWithKnownHeightAndYaw) {
   const auto exact = seen_from(rig, 0.2);
   const Fix reported = positioner.compute_position_fix(exact, known);
   ASSERT_TRUE(reported.has_succeeded());
-  Eigen::Matrix4d covariance = reported.estimate.covariance;
+  Eigen::Matrix4d covariance = reported.pose_covariance();
   EXPECT_LT(covariance(2, 2), 1e-17);
   EXPECT_LT(covariance(3, 3), 1e-17);
   covariance.bottomRightCorner<2, 2>().setIdentity();  // height and yaw do not scatter
   Scatter scatter(rig.camera, covariance);
   Random random(15);
   for (int i = 0; i < kDraws; ++i) {
-    scatter.add(positioner.compute_position_fix(with_noise(exact, random), known).estimate.pose);
+    scatter.add(positioner.compute_position_fix(with_noise(exact, random), known).state.pose);
   }
   EXPECT_LT(scatter.excess().head<2>().cwiseAbs().maxCoeff(), kScatterTolerance);
 }
@@ -227,8 +227,8 @@ TEST(FixCovariance, MatchesScatterForOneLampWithUncertainSensors) {
   sensors.inclination = Inclination{0, 0};
   const Fix reported = positioner.compute_position_fix(seen_from(rig, sigma_px), sensors);
   ASSERT_TRUE(reported.has_succeeded());
-  EXPECT_LT((reported.estimate.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
-  Scatter scatter(rig.body.pose, reported.estimate.covariance);
+  EXPECT_LT((reported.state.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
+  Scatter scatter(rig.body.pose, reported.pose_covariance());
   Random random(21);
   for (int i = 0; i < kDraws; ++i) {
     rig.body.motion = {{0.8 + 0.2 * random.normal(), -0.3 + 0.2 * random.normal()},
@@ -240,7 +240,7 @@ TEST(FixCovariance, MatchesScatterForOneLampWithUncertainSensors) {
     const Fix fix =
         positioner.compute_position_fix(with_noise(seen_from(rig, sigma_px), random), sensors);
     ASSERT_TRUE(fix.has_succeeded());
-    scatter.add(fix.estimate.pose);
+    scatter.add(fix.state.pose);
   }
   expect_efficient(scatter);
 }
@@ -267,7 +267,7 @@ TEST(Positioner, ReturnsTruePositionOfRotatingRobotThatSeesOneLamp) {
   seen.resize(1);
   const Fix fix = rig.positioner().compute_position_fix(seen, sensors);
   ASSERT_TRUE(fix.has_succeeded());
-  EXPECT_LT((fix.estimate.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
+  EXPECT_LT((fix.state.pose.position_m - rig.body.pose.position_m).norm(), 1e-9);
 }
 
 /// With a pinhole lens all pixels have equal weights, and the closed forms are the least-squares
@@ -280,14 +280,13 @@ TEST(FixCovariance, ScatterOfClosedFormPosesReachesCramerRaoBoundWithPinhole) {
     const double sigma_px = 0.2;
     Scatter scatter(rig.camera, compute_limit(rig, sigma_px));
     std::vector<Sighting> sightings;
-    const LevelPose camera(rig.camera);
     for (const Lamp& lamp : rig.map.lamps) {
       sightings.push_back({lamp.position_m, {0, 0}});
     }
     Random random(16);
     for (int i = 0; i < kDraws; ++i) {
       for (Sighting& sighting : sightings) {
-        sighting.z = project_lamp_to_normalized_point(camera, sighting.lamp_m) +
+        sighting.z = level_point_from_world(rig.camera, sighting.lamp_m).hnormalized() +
                      sigma_px / 520 * Eigen::Vector2d(random.normal(), random.normal());
       }
       scatter.add(lamps == 2 ? compute_two_lamp_poses(sightings[0], sightings[1]).poses[0]

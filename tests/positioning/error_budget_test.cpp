@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 
 #include "positioning/positioner.h"
@@ -65,7 +66,7 @@ class ErrorBudgetTerm : public testing::Test {
   void expect_scatter(const Eigen::Matrix4d& covariance, const Draw& draw) {
     const auto exact = seen_from(rig);
     Scatter scatter(rig.camera, covariance);
-    for (int i = 0; i < kDraws; ++i) scatter.add(draw(exact).estimate.pose);
+    for (int i = 0; i < kDraws; ++i) scatter.add(draw(exact).state.pose);
     EXPECT_LT(scatter.excess().cwiseAbs().maxCoeff(), 0.03) << scatter.excess().transpose();
   }
 };
@@ -81,7 +82,7 @@ TEST_F(ErrorBudgetTerm, PrincipalPointCovarianceMatchesScatterOfFixes) {
     auto shifted = exact;
     const Eigen::Vector2d shift = 0.5 * Eigen::Vector2d(random.normal(), random.normal());
     for (Detection& detection : shifted) detection.pixel += shift;
-    const Pose pose = positioner.compute_position_fix(shifted).estimate.pose;
+    const Pose pose = positioner.compute_position_fix(shifted).state.pose;
     Eigen::Vector4d error;
     error << pose.position_m - rig.camera.position_m, pose.yaw_rad - rig.camera.yaw_rad;
     sum += error * error.transpose();
@@ -96,7 +97,7 @@ TEST_F(ErrorBudgetTerm, TiltCovarianceMatchesScatterOfFixes) {
   Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
   for (int i = 0; i < kDraws; ++i) {
     const Inclination wrong{0.003 * random.normal(), 0.003 * random.normal()};
-    const Pose pose = positioner.compute_position_fix(exact, {wrong, 0, {}}).estimate.pose;
+    const Pose pose = positioner.compute_position_fix(exact, {wrong, 0, {}}).state.pose;
     Eigen::Vector4d error;
     error << pose.position_m - rig.camera.position_m, pose.yaw_rad - rig.camera.yaw_rad;
     sum += error * error.transpose();
@@ -154,16 +155,19 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<FreeStates> {
 
   static BodyPrior prior(const FreeStates& may) {
     BodyPrior prior;
-    prior.velocity_sd_m_per_s = may.drive ? 1 : 0;
-    prior.yaw_rate_sd_rad_per_s = may.turn ? 1.5 : 0;
-    prior.inclination_sd_rad = may.lean ? 0.1 : 0;
+    prior.set_sd(kBodyVelocity, may.drive ? 1 : 0);
+    prior.set_sd(kBodyYawRate, may.turn ? 1.5 : 0);
+    prior.set_sd(kBodyRoll, may.lean ? 0.1 : 0);
     return prior;
   }
   Sensors sensors() const {
     const BodyPrior known = prior(GetParam());
     Sensors sensors;
-    sensors.motion = {{0, 0}, 0, known.velocity_sd_m_per_s, known.yaw_rate_sd_rad_per_s};
-    sensors.inclination_sigma_rad = known.inclination_sd_rad;
+    sensors.motion = {{0, 0},
+                      0,
+                      std::sqrt(known.max_variance(kBodyVelocity, 2)),
+                      std::sqrt(known.max_variance(kBodyYawRate, 1))};
+    sensors.inclination_sigma_rad = std::sqrt(known.max_variance(kBodyRoll, 2));
     return sensors;
   }
   std::optional<ErrorBudget> budget(const BodyPrior& prior) const {
@@ -176,7 +180,7 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<FreeStates> {
     const Fix fix = with.positioner().compute_position_fix(detections, sensors());
     EXPECT_TRUE(fix.has_succeeded());
     Eigen::Vector4d state;
-    state << fix.estimate.pose.position_m, fix.estimate.pose.yaw_rad;
+    state << fix.state.pose.position_m, fix.state.pose.yaw_rad;
     return state;
   }
   /// Returns the central difference of a fix with an error of `step`.
@@ -199,7 +203,8 @@ TEST_P(ErrorBudgetWithPrior, NoiseMotionAndRollPitchTermsSumToFixCovariance) {
   ASSERT_TRUE(fix.has_succeeded());
   const auto found = budget(prior(GetParam()));
   ASSERT_TRUE(found);
-  expect_close(found->noise + found->motion + found->roll_pitch, fix.noise_covariance, 1e-6);
+  expect_close(found->noise + found->motion + found->roll_pitch,
+               Matrix4(fix.noise_covariance.topLeftCorner<4, 4>()), 1e-6);
   const auto& [drive, turn, lean] = GetParam();
   EXPECT_EQ(found->motion.diagonal().minCoeff() > 0, drive || turn);
   EXPECT_EQ(found->roll_pitch.diagonal().maxCoeff() > 1e-12, lean);
@@ -267,7 +272,8 @@ class ErrorBudgetPriorCases : public ErrorBudgetWithPrior {};
 
 TEST_F(ErrorBudgetPriorCases, EqualsBudgetOfStandingCameraWhenPriorIsTight) {
   BodyPrior prior;
-  prior.velocity_sd_m_per_s = prior.inclination_sd_rad = 1e-7;
+  prior.set_sd(kBodyVelocity, 1e-7);
+  prior.set_sd(kBodyRoll, 1e-7);
   const auto found = budget(prior);
   const Camera& camera = rig.calibration.camera;
   const auto standing =
@@ -288,7 +294,7 @@ TEST_F(ErrorBudgetPriorCases, CalibratedTiltTermIsNegligibleWhenTiltIsEstimated)
 
 TEST_F(ErrorBudgetPriorCases, ReturnsNulloptForTwoOrCollinearLampsWithFreeTilt) {
   BodyPrior in_hand;
-  in_hand.inclination_sd_rad = 1.6;
+  in_hand.set_sd(kBodyRoll, 1.6);
   rig.map.lamps.resize(2);
   EXPECT_TRUE(budget(prior({true, true, false})));
   EXPECT_FALSE(budget(in_hand));

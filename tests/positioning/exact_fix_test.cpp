@@ -35,8 +35,8 @@ void expect_exact(const SyntheticRig& rig, const Sensors& sensors = {}) {
   const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections, sensors);
   ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
   EXPECT_EQ(fix.lamps, static_cast<int>(detections.size()));
-  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, kExact_m));
-  EXPECT_NEAR(wrap_angle_rad(fix.estimate.pose.yaw_rad - rig.camera.yaw_rad), 0, kExact_rad);
+  EXPECT_THAT(fix.state.pose.position_m, IsNear(rig.camera.position_m, kExact_m));
+  EXPECT_NEAR(wrap_angle_rad(fix.state.pose.yaw_rad - rig.camera.yaw_rad), 0, kExact_rad);
   EXPECT_NEAR(fix.residual_px, 0, 1e-6);  // 1e-9 m at f / H = 325 px/m
 }
 
@@ -109,8 +109,8 @@ TEST(PositionerNoiseless, MatchesRobotPoseWithCameraMount) {
   const Fix fix =
       Positioner(rig.map, rig.calibration, options).compute_position_fix(seen_from(rig));
   ASSERT_TRUE(fix.has_succeeded());
-  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(robot.position_m, kExact_m));
-  EXPECT_NEAR(fix.estimate.pose.yaw_rad, robot.yaw_rad, kExact_rad);
+  EXPECT_THAT(fix.state.pose.position_m, IsNear(robot.position_m, kExact_m));
+  EXPECT_NEAR(fix.state.pose.yaw_rad, robot.yaw_rad, kExact_rad);
 }
 
 TEST(PositionerNoiseless, MatchesPoseOfTiltedRobotWithCameraMount) {
@@ -135,8 +135,8 @@ TEST(PositionerNoiseless, MatchesPoseOfTiltedRobotWithCameraMount) {
   const Fix fix = Positioner(rig.map, rig.calibration, options)
                       .compute_position_fix(seen_from(rig), {of_robot, 0, {}});
   ASSERT_TRUE(fix.has_succeeded());
-  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(robot_m, kExact_m));
-  EXPECT_NEAR(fix.estimate.pose.yaw_rad, robot_yaw_rad, kExact_rad);
+  EXPECT_THAT(fix.state.pose.position_m, IsNear(robot_m, kExact_m));
+  EXPECT_NEAR(fix.state.pose.yaw_rad, robot_yaw_rad, kExact_rad);
 }
 
 /// Two of the lamps fit two poses; the third selects one.
@@ -152,7 +152,7 @@ TEST(PositionerNoiseless, MatchesTruthForThreeLampsWithAmbiguousPair) {
     if (detections.size() < 3) continue;
     const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
     ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
-    EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 1e-6));
+    EXPECT_THAT(fix.state.pose.position_m, IsNear(rig.camera.position_m, 1e-6));
     ++fixes;
   }
   EXPECT_GT(fixes, 0);
@@ -169,7 +169,7 @@ TEST(PositionerNoiseless, MatchesTruthForLargeNationalCoordinates) {
     const Fix exact = positioner.compute_position_fix(seen_from(rig));
     ASSERT_TRUE(exact.has_succeeded());
     // The coordinates themselves are rounded to 1e-9 m.
-    EXPECT_THAT(exact.estimate.pose.position_m, IsNear(rig.camera.position_m, 1e-8));
+    EXPECT_THAT(exact.state.pose.position_m, IsNear(rig.camera.position_m, 1e-8));
     EXPECT_TRUE(
         positioner.compute_position_fix(with_noise(seen_from(rig, 0.5), random)).has_succeeded());
   }

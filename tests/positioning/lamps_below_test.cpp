@@ -42,15 +42,13 @@ class CameraAboveLamps : public testing::Test {
   void expect_exact(const Sensors& sensors) const {
     const Fix fix = locate(sensors);
     ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
-    EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-7));
-    EXPECT_NEAR(fix.estimate.pose.yaw_rad, rig.body.pose.yaw_rad, 1e-7);
-    if (!fix.body) return;
-    EXPECT_NEAR(fix.body->inclination.roll_rad, rig.body.motion.inclination.roll_rad, 1e-7);
-    EXPECT_NEAR(fix.body->inclination.pitch_rad, rig.body.motion.inclination.pitch_rad, 1e-7);
-    const Eigen::Vector2d velocity =
-        Eigen::Rotation2Dd(rig.body.pose.yaw_rad) * rig.body.motion.velocity_m_per_s;
-    EXPECT_NEAR((fix.body->velocity_m_per_s - velocity).norm(), 0, 1e-5);
-    EXPECT_NEAR(fix.body->yaw_rate_rad_per_s, rig.body.motion.yaw_rate_rad_per_s, 1e-5);
+    EXPECT_THAT(fix.state.pose.position_m, IsNear(rig.body.pose.position_m, 1e-7));
+    EXPECT_NEAR(fix.state.pose.yaw_rad, rig.body.pose.yaw_rad, 1e-7);
+    EXPECT_NEAR(fix.state.motion.inclination.roll_rad, rig.body.motion.inclination.roll_rad, 1e-7);
+    EXPECT_NEAR(fix.state.motion.inclination.pitch_rad, rig.body.motion.inclination.pitch_rad,
+                1e-7);
+    EXPECT_THAT(fix.state.motion.velocity_m_per_s, IsNear(rig.body.motion.velocity_m_per_s, 1e-5));
+    EXPECT_NEAR(fix.state.motion.yaw_rate_rad_per_s, rig.body.motion.yaw_rate_rad_per_s, 1e-5);
   }
 };
 
@@ -98,7 +96,7 @@ TEST_F(CameraAboveLamps, FixOfOneLampUsesHeightAndYaw) {
   rig.map.lamps.resize(1);
   const Fix fix = rig.positioner().compute_position_fix(seen_from(rig, kSigma_px), sensors);
   ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
-  EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.body.pose.position_m, 1e-9));
+  EXPECT_THAT(fix.state.pose.position_m, IsNear(rig.body.pose.position_m, 1e-9));
 }
 
 TEST_F(CameraAboveLamps, FixUsesKnownHeight) {
@@ -107,15 +105,16 @@ TEST_F(CameraAboveLamps, FixUsesKnownHeight) {
   sensors.height = KnownHeight{1.4, 1e-6};
   const Fix fix = locate(sensors);
   ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
-  EXPECT_NEAR(std::sqrt(fix.estimate.covariance(2, 2)), 1e-6, 1e-8);
+  EXPECT_NEAR(std::sqrt(fix.pose_covariance()(2, 2)), 1e-6, 1e-8);
 }
 
 /// States (X, Y, Z, yaw, vx, vy, yaw rate, roll, pitch) of a fix.
 Eigen::VectorXd states_of(const Fix& fix) {
-  const auto& [position_m, yaw_rad] = fix.estimate.pose;
+  const auto& [position_m, yaw_rad] = fix.state.pose;
   Eigen::VectorXd states(kBodyStates);
-  states << position_m, yaw_rad, fix.body->velocity_m_per_s, fix.body->yaw_rate_rad_per_s,
-      fix.body->inclination.roll_rad, fix.body->inclination.pitch_rad;
+  states << position_m, yaw_rad, fix.state.motion.velocity_m_per_s,
+      fix.state.motion.yaw_rate_rad_per_s, fix.state.motion.inclination.roll_rad,
+      fix.state.motion.inclination.pitch_rad;
   return states;
 }
 
@@ -131,7 +130,7 @@ TEST_F(CameraAboveLamps, CovarianceIsThatOfPixelNoise) {
   const Positioner positioner = rig.positioner();
   const auto states = [&] {
     const Fix fix = positioner.compute_position_fix(detections, sensors);
-    EXPECT_TRUE(fix.has_succeeded() && fix.body);
+    EXPECT_TRUE(fix.has_succeeded());
     return states_of(fix);
   };
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(kBodyStates, kBodyStates);
@@ -149,11 +148,9 @@ TEST_F(CameraAboveLamps, CovarianceIsThatOfPixelNoise) {
   }
   const Fix fix = positioner.compute_position_fix(detections, sensors);
   const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd difference = scale.asDiagonal() *
-                                     (Eigen::MatrixXd(fix.body->covariance) - covariance) *
-                                     scale.asDiagonal();
+  const Eigen::MatrixXd difference =
+      scale.asDiagonal() * (Eigen::MatrixXd(fix.covariance) - covariance) * scale.asDiagonal();
   EXPECT_LT(difference.cwiseAbs().maxCoeff(), 0.01);
-  EXPECT_EQ(fix.estimate.covariance, (fix.body->covariance.topLeftCorner<4, 4>()));
 }
 
 /// A level camera above two lamps with known errors.
@@ -181,12 +178,12 @@ class CameraAboveUncertainLamps : public CameraAboveLamps {
             step_m * other.calibration.camera.focal_px().cwiseProduct(
                          dispersion->uncertain_lamps[lamp].jacobian_wrt_position.col(i % 3));
       }
-      const Pose pose = other.positioner().compute_position_fix(detections).estimate.pose;
-      derivatives.col(i) << (pose.position_m - fix.estimate.pose.position_m) / step_m,
-          (pose.yaw_rad - fix.estimate.pose.yaw_rad) / step_m;
+      const Pose pose = other.positioner().compute_position_fix(detections).state.pose;
+      derivatives.col(i) << (pose.position_m - fix.state.pose.position_m) / step_m,
+          (pose.yaw_rad - fix.state.pose.yaw_rad) / step_m;
     }
     const Eigen::Matrix4d covariance = derivatives * lamp_covariance * derivatives.transpose();
-    EXPECT_LT((fix.estimate.covariance - covariance).cwiseAbs().maxCoeff(),
+    EXPECT_LT((fix.pose_covariance() - covariance).cwiseAbs().maxCoeff(),
               0.01 * covariance.cwiseAbs().maxCoeff());
   }
 };
@@ -251,10 +248,10 @@ TEST_F(CameraAboveLamps, FixOfCLibraryIsThatOfPositioner) {
   vlp_fix fix;
   EXPECT_EQ(vlp_locate(positioner, detections.data(), detections.size(), &sensors, &fix), VLP_OK);
   vlp_close(positioner);
-  EXPECT_THAT(Eigen::Vector3d(fix.position_m), IsNear(rig.body.pose.position_m, 1e-7));
-  EXPECT_NEAR(fix.yaw_rad, 0.7, 1e-7);
-  EXPECT_NEAR(fix.roll_rad, 0.1, 1e-7);
-  EXPECT_NEAR(fix.pitch_rad, -0.15, 1e-7);
+  EXPECT_THAT(Eigen::Vector3d(fix.state.position_m), IsNear(rig.body.pose.position_m, 1e-7));
+  EXPECT_NEAR(fix.state.yaw_rad, 0.7, 1e-7);
+  EXPECT_NEAR(fix.state.roll_rad, 0.1, 1e-7);
+  EXPECT_NEAR(fix.state.pitch_rad, -0.15, 1e-7);
 }
 
 }  // namespace

@@ -139,8 +139,8 @@ TEST(Positioner, ComputesEqualFixesInConcurrentThreads) {
     threads.emplace_back([&] {
       for (int i = 0; i < 2000; ++i) {
         const Fix fix = positioner.compute_position_fix(detections);
-        if (fix.estimate.pose.position_m != expected.estimate.pose.position_m ||
-            fix.estimate.covariance != expected.estimate.covariance) {
+        if (fix.state.pose.position_m != expected.state.pose.position_m ||
+            fix.pose_covariance() != expected.pose_covariance()) {
           ++different;
         }
       }

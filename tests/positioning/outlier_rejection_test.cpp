@@ -37,7 +37,7 @@ class LevelCamera : public testing::Test {
   static std::vector<Eigen::Vector2d> make_points() {
     std::vector<Eigen::Vector2d> exact;
     for (const Eigen::Vector3d& lamp_m : kLevelLamps_m)
-      exact.push_back(project_lamp_to_normalized_point(LevelPose(kTruth), lamp_m));
+      exact.push_back(level_point_from_world(kTruth, lamp_m).hnormalized());
     return exact;
   }
   /// Displaces a lamp in the image.
@@ -100,10 +100,10 @@ TEST_F(LevelCamera, IsMajorityOfLampsWithinResidualLimit) {
   displace(0, {40, 0});
   displace(1, {0, -60});
   FrameObservations frame = make_frame(5, far_m);
-  const auto [status, fix] = estimate_body_state_robust(frame, problem, fraction);
-  ASSERT_EQ(status, FixStatus::ok);
+  const BodySolution found = estimate_body_state_robust(frame, problem, fraction);
+  ASSERT_EQ(found.status, FixStatus::ok);
   EXPECT_EQ(frame.size, 3U);
-  EXPECT_THAT(fix.state.pose.position_m, IsNear(kTruth.position_m, 1e-9));
+  EXPECT_THAT(found.fix.state.pose.position_m, IsNear(kTruth.position_m, 1e-9));
   FrameObservations four = make_frame(4, far_m);
   EXPECT_EQ(estimate_body_state_robust(four, problem, fraction).status, FixStatus::inconsistent)
       << "two of four";
@@ -119,7 +119,7 @@ TEST_F(LevelCamera, IsUnderMirroredMapIfWeightedResidualsOfMirrorImageAreSmaller
       const Eigen::Matrix2d axes = Eigen::Rotation2Dd(angle_rad).toRotationMatrix();
       const Eigen::Vector3d lamp_m(x_m, y_m, y_m > 0 ? 1.8 : 1.6);
       const Eigen::Vector2d z =
-          project_lamp_to_normalized_point(LevelPose(kTruth), lamp_m) + error * axes.col(1);
+          level_point_from_world(kTruth, lamp_m).hnormalized() + error * axes.col(1);
       const Eigen::DiagonalMatrix<double, 2> weights(1000, 0.1), mirror(1, -1);
       frame.add_current(
           make_level_observation(lamp_m, mirror * z, weights * axes.transpose() * mirror, 0.01), 0,

@@ -25,10 +25,10 @@ struct OverLimit {
       return;
     }
     Eigen::Array4d error;
-    error << (fix.estimate.pose.position_m - truth.position_m).array(),
-        wrap_angle_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
+    error << (fix.state.pose.position_m - truth.position_m).array(),
+        wrap_angle_rad(fix.state.pose.yaw_rad - truth.yaw_rad);
     over_limit += error.square() / limit.diagonal().array();
-    over_stated += error.square() / fix.noise_covariance.diagonal().array();
+    over_stated += error.square() / fix.noise_covariance.diagonal().head<4>().array();
     ++fixes;
   }
   Eigen::Array4d ratio() const { return (over_limit / fixes).sqrt(); }
@@ -39,19 +39,19 @@ struct OverLimit {
 std::optional<Matrix4> compute_limit(const BodyRig& rig, const Sensors& sensors) {
   const Fix exact = rig.positioner().compute_position_fix(seen_from(rig, kLimitNoise_px), sensors);
   if (!exact.has_succeeded()) return std::nullopt;
-  return exact.noise_covariance;
+  return exact.noise_covariance.topLeftCorner<4, 4>();
 }
 
 TEST(BodyPrior, MotionIsEstimatedWhenVelocityOrYawRateIsUncertain) {
   BodyPrior prior;
   EXPECT_FALSE(prior.is_motion_estimated() || prior.is_motion_or_tilt_estimated());
-  prior.velocity_sd_m_per_s = 0.01;
+  prior.set_sd(kBodyVelocity, 0.01);
   EXPECT_TRUE(prior.is_motion_estimated() && prior.is_motion_or_tilt_estimated());
-  prior.velocity_sd_m_per_s = 0;
-  prior.yaw_rate_sd_rad_per_s = 0.01;
+  prior.set_sd(kBodyVelocity, 0);
+  prior.set_sd(kBodyYawRate, 0.01);
   EXPECT_TRUE(prior.is_motion_estimated() && prior.is_motion_or_tilt_estimated());
-  prior.yaw_rate_sd_rad_per_s = 0;
-  prior.inclination_sd_rad = 0.01;
+  prior.set_sd(kBodyYawRate, 0);
+  prior.set_sd(kBodyRoll, 0.01);
   EXPECT_TRUE(!prior.is_motion_estimated() && prior.is_motion_or_tilt_estimated());
 }
 

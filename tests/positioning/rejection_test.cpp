@@ -5,7 +5,6 @@
 
 #include <algorithm>
 
-#include "positioning/floor_limits.h"
 #include "positioning/positioner.h"
 #include "support/matchers.h"
 #include "support/synthetic_rig.h"
@@ -29,7 +28,7 @@ class PositionerOutlierRejection : public testing::Test {
   }
   void expect_truth(const Fix& fix) {
     ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
-    EXPECT_THAT(fix.estimate.pose.position_m, IsNear(rig.camera.position_m, 0.005));
+    EXPECT_THAT(fix.state.pose.position_m, IsNear(rig.camera.position_m, 0.005));
   }
 };
 
@@ -177,11 +176,11 @@ TEST_F(PositionerOutlierRejection, FixesHaveErrorsBelow20MmDespiteMisidentifiedG
   int fixes = 0;
   for (int i = 0; i < 2000; ++i) {
     rig.camera = {{random.uniform(-0.5, 0.5), random.uniform(-0.5, 0.5), 0}, random.uniform(-3, 3)};
-    const auto visible = find_visible_lamps(rig.map, rig.calibration.camera, rig.camera);
+    const auto& [width, height] = rig.calibration.camera.imager_px;
     auto detections = with_noise(seen_from(rig, 0.2), random);
-    std::erase_if(detections, [&](const Detection& detection) {
-      const auto& lamp = rig.map.lamps[static_cast<std::size_t>(detection.lamp) - 1];
-      return std::find(visible.begin(), visible.end(), lamp.position_m) == visible.end();
+    std::erase_if(detections, [width = width, height = height](const Detection& detection) {
+      const Eigen::Array2d pixel = detection.pixel;
+      return (pixel < 0).any() || (pixel > Eigen::Array2d(width, height) - 1).any();
     });
     const std::size_t count = 4 + random.index(3);
     while (detections.size() > count) {
@@ -199,7 +198,7 @@ TEST_F(PositionerOutlierRejection, FixesHaveErrorsBelow20MmDespiteMisidentifiedG
     const Fix fix = locate(detections);
     if (!fix.has_succeeded()) continue;
     ++fixes;
-    EXPECT_LT((fix.estimate.pose.position_m - rig.camera.position_m).norm(), 0.02) << i;
+    EXPECT_LT((fix.state.pose.position_m - rig.camera.position_m).norm(), 0.02) << i;
   }
   EXPECT_GT(fixes, 1500);
 }

@@ -31,40 +31,15 @@ TEST(SumSquaredResidualsOfFixes, IgnoresFailedFixesAndFixesWithoutRedundancy) {
   const std::vector<Fix> fixes{fix_with(12, 2, 8), Fix(), fix_with(5, 1, 0), fix_with(6, 0, 4)};
   const ResidualSums sums = sum_squared_residuals_of_fixes(fixes);
   EXPECT_EQ(sums.degrees_of_freedom, 12);
-  EXPECT_EQ(sums.chi_squared, 18);
-  EXPECT_EQ(sums.common_chi_squared, 2);
   EXPECT_EQ(sums.squares_px2, 2);
 }
 
 TEST(SumSquaredResidualsOfFixes, ExcludesFixAbove25TimesMedianChiSquaredRatio) {
   // The median of 1, 1.25 and the third one's ratio is 1.25, and 25 times that is 31.25.
-  for (const auto& [chi_squared, sum] : {std::pair(124.0, 133.0), {126.0, 9.0}, {3000.0, 9.0}}) {
+  for (const auto& [chi_squared, sum] : {std::pair(124.0, 12.0), {126.0, 8.0}, {3000.0, 8.0}}) {
     const std::vector<Fix> fixes{fix_with(5, 0, 4), fix_with(4, 0, 4), fix_with(chi_squared, 0, 4)};
-    EXPECT_EQ(sum_squared_residuals_of_fixes(fixes).chi_squared, sum);
+    EXPECT_EQ(sum_squared_residuals_of_fixes(fixes).degrees_of_freedom, sum);
   }
-}
-
-TEST(EstimateNoiseScaleFactor, SubtractsCommonChiSquaredButKeepsQuarterOfTotal) {
-  EXPECT_DOUBLE_EQ(
-      estimate_noise_scale_factor({.chi_squared = 36, .degrees_of_freedom = 9}).value(), 2);
-  EXPECT_DOUBLE_EQ(estimate_noise_scale_factor(
-                       {.chi_squared = 36, .common_chi_squared = 27, .degrees_of_freedom = 9})
-                       .value(),
-                   1);
-  EXPECT_EQ(estimate_noise_scale_factor(
-                {.chi_squared = 36, .common_chi_squared = 35, .degrees_of_freedom = 9})
-                .value(),
-            1);
-  EXPECT_FALSE(estimate_noise_scale_factor({}));
-}
-
-TEST(EstimateBirgeRatio, IsOneForSmallResidualsOrFewDegreesOfFreedom) {
-  EXPECT_EQ(estimate_birge_ratio({.chi_squared = 10, .degrees_of_freedom = 20}), 1);
-  EXPECT_EQ(estimate_birge_ratio({.chi_squared = 40, .degrees_of_freedom = 10}), 1);
-  EXPECT_DOUBLE_EQ(estimate_birge_ratio({.chi_squared = 80, .degrees_of_freedom = 20}), 2);
-  EXPECT_EQ(
-      estimate_birge_ratio({.chi_squared = 80, .common_chi_squared = 30, .degrees_of_freedom = 20}),
-      1);
 }
 
 /// Mean of chi_squared over fixes of a rig whose lamps have random offsets from the map.
@@ -78,10 +53,10 @@ class ComputeExpectedChiSquaredOfCommonErrors : public testing::Test {
   void expect_mean(const Sensors& sensors) {
     constexpr int draws = 4000;
     PositionerOptions options;
-    options.computes_common_chi_squared = true;
     options.max_residual_fraction = std::numeric_limits<double>::max();
     const Positioner positioner(rig.map, rig.calibration, options);
-    double found = 0, expected = 0, common = 0;
+    double found = 0, redundancy = 0, common = 0;
+    int fixes = 0, with_common = 0;
     for (int i = 0; i < draws; ++i) {
       SyntheticRig real = rig;
       for (Lamp& lamp : real.map.lamps) {
@@ -94,10 +69,14 @@ class ComputeExpectedChiSquaredOfCommonErrors : public testing::Test {
       // Draws without a fix or with a rejected lamp have the largest residuals: 1 in 10,000.
       if (!fix.has_succeeded() || fix.rejected_lamps > 0) continue;
       found += fix.chi_squared;
-      expected += fix.redundancy + fix.common_chi_squared;
+      redundancy += fix.redundancy;
+      ++fixes;
       common += fix.common_chi_squared;
+      with_common += fix.common_chi_squared > 0;
     }
-    EXPECT_GT(common, 0.2 * expected);
+    ASSERT_GT(with_common, draws / 4);
+    const double expected = redundancy + fixes * common / with_common;
+    EXPECT_GT(expected, 1.2 * redundancy);
     EXPECT_NEAR(found / expected, 1, 0.03);
   }
 
@@ -113,14 +92,6 @@ TEST_F(ComputeExpectedChiSquaredOfCommonErrors, MatchesMeanChiSquaredWithEstimat
   Sensors sensors;
   sensors.inclination_sigma_rad = 0.01;
   expect_mean(sensors);
-}
-
-TEST_F(ComputeExpectedChiSquaredOfCommonErrors,
-       FixHasZeroCommonChiSquaredWithDefaultPositionerOptions) {
-  const Fix fix =
-      Positioner(rig.map, rig.calibration).compute_position_fix(seen_from(rig, kPixelSd_px));
-  ASSERT_TRUE(fix.has_succeeded());
-  EXPECT_EQ(fix.common_chi_squared, 0);
 }
 
 }  // namespace

@@ -14,6 +14,7 @@
 #include "frontend/image_file.h"
 #include "frontend/mat_view.h"
 #include "lamps/lamp_detector.h"
+#include "positioning/image_fix.h"
 #include "positioning/vlp.h"
 #include "support/random.h"
 #include "support/temporary_folder.h"
@@ -69,6 +70,39 @@ TEST(CFunctionVlpDetect, ReturnsSameLampsAsLampDetector) {
       EXPECT_EQ(detections[i].sigma_px, expected[i].sigma_px);
     }
   }
+}
+
+TEST(CFunctionVlpLocateImage, EqualsCppFixForUnknownTilt) {
+  const cv::Mat image = sample();
+  const LampMap lamps = read_lamp_map(kRendered + "lamps.yaml");
+  Sensors same;
+  same.inclination_sigma_rad = 0.2;
+  const auto expected =
+      locate_camera_in_image(Positioner(lamps, calibration()), LampDetector(lamps, calibration()),
+                             to_image_view(image), same);
+  ASSERT_TRUE(expected.fix.has_succeeded());
+  ASSERT_GE(expected.repetition, 2U);
+  const Handle positioner = open(calibration());
+  const vlp_image given = c_image(to_image_view(image));
+  vlp_sensors sensors = {};
+  sensors.inclination_sigma_rad = 0.2;
+  sensors.stamp = 7;
+  Detections detections;
+  std::size_t count = 0;
+  vlp_fix fix;
+  ASSERT_EQ(vlp_locate_image(positioner.get(), &given, &sensors, detections.data(),
+                             detections.size(), &count, &fix),
+            VLP_OK);
+  EXPECT_EQ(fix.stamp, 7);
+  EXPECT_EQ(Eigen::Vector3d(fix.state.position_m), expected.fix.state.pose.position_m);
+  ASSERT_EQ(count, expected.detections.size());
+  EXPECT_EQ(detections[0].u_px, expected.detections[0].pixel.x());
+  vlp_image wrong = given;
+  wrong.width = 5;
+  EXPECT_EQ(vlp_locate_image(positioner.get(), &wrong, nullptr, detections.data(),
+                             detections.size(), &count, &fix),
+            VLP_BAD_ARGUMENT);
+  EXPECT_EQ(fix.status, VLP_BAD_ARGUMENT);
 }
 
 TEST(CFunctionVlpDetect, ReturnsRequiredCountWhenArrayIsTooSmall) {

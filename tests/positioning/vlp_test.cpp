@@ -42,7 +42,8 @@ static_assert(VLP_ROW_TIME_UNKNOWN == static_cast<int>(FixStatus::row_time_unkno
 using testing::HasSubstr;
 using testing::IsEmpty;
 using Handle = std::unique_ptr<vlp_positioner, void (*)(vlp_positioner*)>;
-using Covariance6 = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+using Covariance =
+    Eigen::Map<const Eigen::Matrix<double, kBodyStates, kBodyStates, Eigen::RowMajor>>;
 
 /// A moving, tilted body under lamps, its files, and the positioners of both APIs.
 class CInterface : public testing::Test {
@@ -85,17 +86,18 @@ class CInterface : public testing::Test {
 void expect_same(const vlp_fix& c, const Fix& fix) {
   ASSERT_EQ(c.status, static_cast<int>(fix.status));
   ASSERT_EQ(c.status, VLP_OK);
-  const Covariance6 covariance(c.covariance), noise(c.noise_covariance);
-  const std::array<int, 4> pose = {0, 1, 2, 5};
-  for (int i = 0; i < 4; ++i) {
-    for (int k = 0; k < 4; ++k) {
-      const int row = pose[static_cast<std::size_t>(i)], col = pose[static_cast<std::size_t>(k)];
-      EXPECT_EQ(covariance(row, col), fix.estimate.covariance(i, k));
-      EXPECT_EQ(noise(row, col), fix.noise_covariance(i, k));
-    }
-  }
-  EXPECT_EQ(Eigen::Vector3d(c.position_m), fix.estimate.pose.position_m);
-  EXPECT_EQ(c.yaw_rad, fix.estimate.pose.yaw_rad);
+  const Covariance covariance(c.covariance);
+  EXPECT_EQ(covariance, fix.covariance);
+  EXPECT_EQ(Covariance(c.noise_covariance), fix.noise_covariance);
+  const auto& [pose, motion] = fix.state;
+  EXPECT_EQ(Eigen::Vector3d(c.state.position_m), pose.position_m);
+  EXPECT_EQ(c.state.yaw_rad, pose.yaw_rad);
+  EXPECT_EQ(Eigen::Vector2d(c.state.velocity_m_per_s), motion.velocity_m_per_s);
+  EXPECT_EQ(c.state.yaw_rate_rad_per_s, motion.yaw_rate_rad_per_s);
+  EXPECT_EQ(c.state.roll_rad, motion.inclination.roll_rad);
+  EXPECT_EQ(c.state.pitch_rad, motion.inclination.pitch_rad);
+  EXPECT_EQ(c.chi_squared, fix.chi_squared);
+  EXPECT_EQ(c.redundancy, fix.redundancy);
   EXPECT_EQ(c.residual_px, fix.residual_px);
   EXPECT_EQ(c.lamps, fix.lamps);
   EXPECT_EQ(c.rejected_lamps, fix.rejected_lamps);
@@ -113,10 +115,9 @@ TEST_F(CInterface, VlpLocateEqualsCppFixForStandingCamera) {
   const auto positioner = open();
   expect_same(located(positioner.get(), nullptr), rig.positioner().compute_position_fix(seen));
   const vlp_fix fix = located(positioner.get(), nullptr);
-  EXPECT_NEAR(fix.position_m[0], 0.1, 1e-9);
-  EXPECT_EQ(fix.roll_rad, 0);
-  EXPECT_EQ(fix.velocity_m_per_s[0], 0);
-  EXPECT_EQ(Covariance6(fix.covariance).row(3), Eigen::RowVectorXd::Zero(6));
+  EXPECT_NEAR(fix.state.position_m[0], 0.1, 1e-9);
+  EXPECT_EQ(fix.state.roll_rad, 0);
+  EXPECT_EQ(Covariance(fix.covariance).row(kBodyRoll), Eigen::RowVectorXd::Zero(kBodyStates));
 }
 
 TEST_F(CInterface, VlpLocateEqualsCppFixForMovingTiltedRobot) {
@@ -138,24 +139,13 @@ TEST_F(CInterface, VlpLocateEqualsCppFixForMovingTiltedRobot) {
   const Fix fix = rig.positioner().compute_position_fix(seen, same);
   const vlp_fix c = located(open(&options).get(), &sensors);
   expect_same(c, fix);
-  ASSERT_TRUE(fix.body);
   EXPECT_EQ(c.stamp, sensors.stamp);
-  EXPECT_EQ(c.roll_rad, fix.body->inclination.roll_rad);
-  EXPECT_EQ(c.pitch_rad, fix.body->inclination.pitch_rad);
-  EXPECT_EQ(c.velocity_m_per_s[1], fix.body->velocity_m_per_s.y());
-  EXPECT_EQ(c.yaw_rate_rad_per_s, fix.body->yaw_rate_rad_per_s);
-  const Covariance6 covariance(c.covariance);
-  EXPECT_GT(covariance(3, 3), 0);
-  EXPECT_EQ(covariance(0, 3), fix.body->covariance(0, kBodyRoll));
-  EXPECT_EQ(covariance(4, 5), fix.body->covariance(kBodyPitch, kBodyYaw));
-  EXPECT_EQ(covariance(4, 4), fix.body->covariance(kBodyPitch, kBodyPitch));
-  EXPECT_EQ(c.velocity_covariance[1], fix.body->covariance(kBodyVelocity, kBodyVelocity + 1));
-  // The error of the surveyed lamp is common to all fixes and affects roll and pitch, too.
-  const Covariance6 noise(c.noise_covariance);
-  EXPECT_EQ(noise(0, 3), fix.body->noise_covariance(0, kBodyRoll));
-  EXPECT_EQ(noise(4, 4), fix.body->noise_covariance(kBodyPitch, kBodyPitch));
-  EXPECT_LT(noise(4, 4), covariance(4, 4));
-  EXPECT_LT(fix.body->noise_covariance(kBodyVelocity, kBodyVelocity), c.velocity_covariance[0]);
+  // The error of the surveyed lamp is common to all fixes and affects all estimated states.
+  const Covariance covariance(c.covariance), noise(c.noise_covariance);
+  for (const int state : {static_cast<int>(kBodyVelocity), static_cast<int>(kBodyPitch)}) {
+    EXPECT_GT(noise(state, state), 0);
+    EXPECT_LT(noise(state, state), covariance(state, state));
+  }
 }
 
 TEST_F(CInterface, VlpLocateAppliesSigmaAndResidualLimitOptions) {
@@ -200,13 +190,11 @@ TEST_F(CInterface, VlpLocateEqualsCppFixWithOneLampAndSensors) {
   same.motion = KnownMotion{{2, 0}, 0.1, 0, 0.2};
   const vlp_fix fix = located(open().get(), &sensors);
   expect_same(fix, rig.positioner().compute_position_fix(seen, same));
-  EXPECT_EQ(fix.roll_rad, 0.06);
-  EXPECT_EQ(fix.pitch_rad, -0.08);
-  EXPECT_DOUBLE_EQ(Covariance6(fix.covariance)(4, 4), 1e-4);
-  EXPECT_DOUBLE_EQ(fix.velocity_m_per_s[0], 2 * std::cos(0.4));
-  EXPECT_DOUBLE_EQ(fix.velocity_m_per_s[1], 2 * std::sin(0.4));
-  EXPECT_EQ(fix.yaw_rate_rad_per_s, 0.1);
-  EXPECT_DOUBLE_EQ(fix.velocity_covariance[8], 0.04);
+  EXPECT_NEAR(fix.state.roll_rad, 0.06, 1e-9);
+  EXPECT_NEAR(Covariance(fix.covariance)(kBodyPitch, kBodyPitch), 1e-4, 1e-9);
+  EXPECT_EQ(fix.state.velocity_m_per_s[0], 2);
+  EXPECT_EQ(Covariance(fix.covariance)(kBodyVelocity, kBodyVelocity), 0);
+  EXPECT_NEAR(Covariance(fix.covariance)(kBodyYawRate, kBodyYawRate), 0.04, 1e-6);
 }
 
 TEST_F(CInterface, VlpLocateWithEarlierEqualsCppFix) {
@@ -267,7 +255,7 @@ TEST_F(CInterface, VlpLocateEqualsCppFixWithKnownHeight) {
   same.height = KnownHeight{0, 1e-4};
   const vlp_fix fix = located(open().get(), &sensors);
   expect_same(fix, rig.positioner().compute_position_fix(seen, same));
-  EXPECT_LE(std::sqrt(fix.noise_covariance[14]), 1e-4);
+  EXPECT_LE(std::sqrt(Covariance(fix.noise_covariance)(2, 2)), 1e-4);
 }
 
 TEST_F(CInterface, VlpLocateReturnsNotFiniteForHeightWithoutSd) {
@@ -287,7 +275,7 @@ TEST_F(CInterface, VlpLocateReturnsStampAndUnknownLampsWithoutFix) {
   EXPECT_EQ(fix.status, VLP_TOO_FEW_LAMPS);
   EXPECT_EQ(fix.stamp, -7);
   EXPECT_EQ(fix.unknown_lamps, static_cast<int>(given.size()));
-  EXPECT_EQ(fix.position_m[0], 0);
+  EXPECT_EQ(fix.state.position_m[0], 0);
 }
 
 TEST_F(CInterface, VlpLocateRejectsNullPointersExcessLampsAndInvalidSigma) {

@@ -76,9 +76,47 @@ class Module(unittest.TestCase):
         self.assertEqual(fix.lamps, fixes["lamps"][3])
         leaning = self.positioner.locate(*seen, vlp.Sensors(inclination_sigma_rad=0.1, time_s=7))
         self.assertEqual(leaning.time_s, 7)
-        self.assertLess(abs(leaning.roll_pitch_rad[0]), 0.01)
+        self.assertLess(abs(leaning.state[7]), 0.01)
+        self.assertGreater(leaning.covariance[7, 7], 0)
         mounted = vlp.Positioner(self.lamps, self.calibration, mount=(0, 0, 0.5, 0)).locate(*seen)
         self.assertAlmostEqual(mounted.position_m[2], fix.position_m[2] - 0.5)
+
+    def test_residuals_and_project_agree_with_fix(self):
+        of_3 = self.seen["frames"] == 3
+        lamps, pixels = self.seen["lamps"][of_3], self.seen["pixels"][of_3]
+        fix = self.positioner.locate(lamps, pixels, self.seen["sigma_px"][of_3])
+        of_each = self.positioner.residuals(lamps, pixels, fix)
+        self.assertEqual(of_each["use"], ["used"] * len(lamps))
+        rms_px = np.sqrt((of_each["residual_px"] ** 2).sum(axis=1).mean())
+        self.assertAlmostEqual(rms_px, fix.residual_px, 3)
+        pixel, jacobian = self.positioner.project(lamps[0], fix.state)
+        np.testing.assert_array_equal(pixel, of_each["predicted_px"][0])
+        np.testing.assert_array_equal(jacobian, of_each["jacobian"][0])
+        moved = fix.state + 1e-6 * np.eye(9)[0]
+        change = (self.positioner.project(lamps[0], moved)[0] - pixel) / 1e-6
+        np.testing.assert_allclose(change, jacobian[:, 0], rtol=1e-3, atol=1e-3)
+        unknown = self.positioner.residuals([1000], [[400.0, 300]], fix)
+        self.assertEqual(unknown["use"], ["not_in_map"])
+
+    def test_ambiguous_fix_lists_candidates(self):
+        of_3 = self.seen["frames"] == 3
+        seen = [self.seen[name][of_3][:3] for name in ("lamps", "pixels", "sigma_px")]
+        fix = self.positioner.locate(*seen, vlp.Sensors(inclination_sigma_rad=1.6))
+        self.assertEqual(fix.status, "ambiguous")
+        self.assertGreaterEqual(len(fix.candidates), 2)
+        self.assertAlmostEqual(sum(likelihood for _, likelihood in fix.candidates), 1)
+        nearest = min(np.abs(s[:3] - self.truth["position_m"][3]).max() for s, _ in fix.candidates)
+        self.assertLess(nearest, 0.1)
+
+    def test_prior_replaces_readings(self):
+        of_3 = self.seen["frames"] == 3
+        seen = [self.seen[name][of_3] for name in ("lamps", "pixels", "sigma_px")]
+        known = self.positioner.locate(*seen, vlp.Sensors(inclination_sigma_rad=0.1))
+        variances = np.r_[4 * [np.inf], 3 * [0.0], 2 * [0.01]]
+        prior = vlp.Sensors(prior=(np.zeros(9), np.diag(variances)))
+        fix = self.positioner.locate(*seen, prior)
+        np.testing.assert_allclose(fix.state, known.state, atol=1e-12)
+        np.testing.assert_allclose(fix.covariance, known.covariance, atol=1e-12)
 
     def test_locate_one_lamp_returns_regular_covariance(self):
         seen = [self.seen[name][:1] for name in ("lamps", "pixels", "sigma_px")]
@@ -89,9 +127,9 @@ class Module(unittest.TestCase):
         self.assertTrue(exact.ok and stated.ok)
         self.assertLess(exact.covariance[2, 2], 1e-17)
         self.assertAlmostEqual(stated.covariance[2, 2], 0.005**2)
-        self.assertGreater(np.linalg.eigvalsh(stated.covariance).min(), 0)
+        self.assertGreater(np.linalg.eigvalsh(stated.covariance[:4, :4]).min(), 0)
         self.assertEqual(stated.rejected_ids, [])
-        self.assertIsNone(stated.body_covariance)
+        self.assertEqual(np.abs(stated.covariance[4:]).max(), 0)
 
     def test_locate_reports_rejected_lamps(self):
         of_3 = self.seen["frames"] == 3
@@ -110,9 +148,9 @@ class Module(unittest.TestCase):
         alone = self.positioner.locate(*seen, sensors)
         together = self.positioner.locate(*seen, sensors, earlier=[(*seen, 0.05)])
         self.assertTrue(alone.ok and together.ok)
-        self.assertEqual(together.body_covariance.shape, (9, 9))
-        self.assertLess(together.body_covariance[4, 4], 0.01 * alone.body_covariance[4, 4])
-        self.assertLess(np.abs(together.velocity_m_per_s).max(), 0.01)
+        self.assertEqual(together.covariance.shape, (9, 9))
+        self.assertLess(together.covariance[4, 4], 0.01 * alone.covariance[4, 4])
+        self.assertLess(np.abs(together.state[4:6]).max(), 0.01)
 
     def test_locate_reports_status_without_fix(self):
         fix = self.positioner.locate([1], [[400.0, 300]])
@@ -120,7 +158,7 @@ class Module(unittest.TestCase):
         self.assertEqual(fix.status, "too_few_lamps")
         for figure in ("position_m", "yaw_rad", "covariance", "noise_covariance", "residual_px"):
             self.assertTrue(np.isnan(getattr(fix, figure)).all(), figure)
-        self.assertIsNone(fix.roll_pitch_rad)
+        self.assertTrue(np.isnan(fix.state).all())
         no_sd = vlp.Sensors(height_m=(0, 0))
         fix = self.positioner.locate([1, 2], [[400.0, 300], [500, 300]], sensors=no_sd)
         self.assertEqual(fix.status, "not_finite")
@@ -170,6 +208,19 @@ class Module(unittest.TestCase):
         for lamp, pixel, sigma in zip(lamps, pixels, sigma_px):
             row = (true["frames"] == 0) & (true["lamps"] == lamp)
             self.assertLess(np.linalg.norm(true["pixels"][row][0] - pixel), 6 * sigma + 0.05)
+
+    def test_locate_image_returns_fix_of_its_detections(self):
+        image = np.array(PIL.Image.open(RENDERED / "sample/0000.png"))
+        calibration = vlp.Calibration(RENDERED / "true_calibration.yaml")
+        positioner = vlp.Positioner(vlp.LampMap(RENDERED / "lamps.yaml"), calibration)
+        level, seen = positioner.locate_image(self.detector(), image)
+        for one, other in zip(seen, self.detector().detect(image)):
+            np.testing.assert_array_equal(one, other)
+        np.testing.assert_array_equal(level.state, positioner.locate(*seen).state)
+        sensors = vlp.Sensors(inclination_sigma_rad=0.2)
+        fix, seen = positioner.locate_image(self.detector(), image, sensors)
+        self.assertTrue(fix.ok)
+        np.testing.assert_array_equal(fix.state, positioner.locate(*seen, sensors).state)
 
     def test_detect_identifies_lamps_of_one_room(self):
         text = (RENDERED / "lamps.yaml").read_text()

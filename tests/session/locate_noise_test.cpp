@@ -91,6 +91,51 @@ TEST_P(LocateCameraFromNoisyDetections, ReportedSdsMatchErrorsOfFixes) {
   EXPECT_LT(coverage, 0.97);
 }
 
+/// The noise part of the sd is that of the true noise, whatever is stated, beside errors of the map
+/// that are several times as large.
+TEST(LocateCameraFromDetections, NoiseSdIsThatOfPixelsBesideErrorsOfMap) {
+  constexpr double map_sd_m = 0.002;
+  for (const double stated_to_true : {0.0, 1 / 1.4, 1.0}) {
+    Random random(31);
+    double sum = 0;
+    constexpr int draws = 100, captures = 12;
+    for (int i = 0; i < draws; ++i) {
+      SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
+      LocateInput input{{}, rig.map, rig.calibration};
+      for (std::size_t k = 0; k < rig.map.lamps.size(); ++k) {
+        input.lamps.lamps[k].sd_m = map_sd_m;
+        for (double& coordinate : rig.map.lamps[k].position_m)
+          coordinate += map_sd_m * random.normal();
+      }
+      for (int k = 0; k < captures; ++k) {
+        rig.camera = {{random.uniform(-0.3, 0.3), random.uniform(-0.2, 0.2), 0},
+                      random.uniform(-3, 3)};
+        std::vector<Detection> seen = with_noise(seen_from(rig, 0.05), random);
+        for (Detection& detection : seen) {
+          detection.sigma_px =
+              stated_to_true > 0 ? std::optional(0.05 * stated_to_true) : std::nullopt;
+        }
+        input.frames.push_back({std::to_string(k), seen});
+      }
+      const LocateResult found = locate_camera_from_detections(input);
+      ASSERT_TRUE(found.has_succeeded());
+      double ratio = 0;
+      for (int k = 0; k < captures; ++k) {
+        const auto index = static_cast<std::size_t>(k);
+        for (Detection& detection : input.frames[index].detections) detection.sigma_px = 0.05;
+        const Fix exact = Positioner(input.lamps, input.calibration)
+                              .compute_position_fix(input.frames[index].detections);
+        ASSERT_TRUE(exact.has_succeeded() && found.fixes[index].has_succeeded());
+        ratio +=
+            std::sqrt(exact.noise_covariance(0, 0) / found.fixes[index].noise_covariance(0, 0)) /
+            captures;
+      }
+      sum += ratio;
+    }
+    EXPECT_NEAR(sum / draws, 1, 0.1) << stated_to_true;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Rooms, LocateCameraFromNoisyDetections,
                          testing::Values(Case{"Stated", 0, Noise::stated},
                                          Case{"NotStated", 0, Noise::not_stated},

@@ -3,6 +3,10 @@
 /// locate_camera_from_images() with rendered images.
 #include <gmock/gmock.h>
 
+#include "frontend/image_file.h"
+#include "frontend/mat_view.h"
+#include "lamps/lamp_detector.h"
+#include "positioning/image_fix.h"
 #include "rendered_session.h"
 #include "session/locate_step.h"
 
@@ -64,6 +68,27 @@ TEST_F(LocateCameraFromImages, ObservationsAreThoseOfFixesIfTiltIsEstimated) {
   for (std::size_t i = 0; i < result.rows.size(); ++i) {
     ASSERT_TRUE(result.rows[i].fix && again.rows[i].fix) << i;
     EXPECT_EQ(again.rows[i].fix->pose.position_m, result.rows[i].fix->pose.position_m) << i;
+  }
+}
+
+TEST_F(LocateCameraFromImages, DetectionsAreThoseOfLibraryIfTiltIsEstimated) {
+  LocateInput input = make_input();
+  input.roll_pitch_sd_rad = 0.1;
+  const LocateResult result = locate("check", input);
+  ASSERT_TRUE(result.has_succeeded()) << result.message;
+  const Positioner positioner(lamps, calibration);
+  const LampDetector detector(lamps, calibration);
+  Sensors sensors;
+  sensors.inclination_sigma_rad = 0.1;
+  ASSERT_EQ(result.observations.images.size(), 6U);
+  for (const Observation& image : result.observations.images) {
+    const cv::Mat pixels = read_image(image.file);
+    const auto found = locate_camera_in_image(positioner, detector, to_image_view(pixels), sensors);
+    ASSERT_TRUE(found.fix.has_succeeded());
+    const auto expected = collect_identified_lamps(image);
+    ASSERT_EQ(found.detections.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i)
+      EXPECT_EQ(found.detections[i].pixel, expected[i].pixel);
   }
 }
 

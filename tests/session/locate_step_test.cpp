@@ -80,6 +80,22 @@ TEST(LocateCameraFromDetections, WarnsOfMovingCameraUnlessMotionIsGiven) {
               Not(testing::Contains(HasSubstr("moves"))));
 }
 
+TEST(LocateCameraFromDetections, WarnsOfTiltedCameraUnlessTiltIsEstimated) {
+  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
+  LocateInput input{{}, rig.map, rig.calibration};
+  rig.body.motion.inclination = {0.03, -0.04};
+  for (int i = 0; i < 12; ++i) {
+    rig.body.pose = {{0.05 * i - 0.3, -0.02 * i, 0}, 0.5 * i};
+    input.frames.push_back({std::to_string(i), seen_from(rig, 0.02)});
+  }
+  const auto warning = HasSubstr(
+      "the images fit a tilted camera, by 2.9 degrees: state "
+      "inclinations in captures.csv, or --roll-pitch-sd-deg");
+  EXPECT_THAT(locate_camera_from_detections(input).warnings, testing::Contains(warning));
+  input.roll_pitch_sd_rad = 0.1;
+  EXPECT_THAT(locate_camera_from_detections(input).warnings, Not(testing::Contains(warning)));
+}
+
 TEST(LocateCameraFromDetections, DoesNotWarnOfMotionWhenStandingWithMovedLamp) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   LocateInput input{{}, rig.map, rig.calibration};
@@ -294,7 +310,7 @@ TEST(LocateCameraFromDetections, WindowOfTwoUsesLatestEarlierFrameWithTime) {
         input.frames[2].detections, sensors,
         std::array{EarlierFrame{input.frames[earlier].detections, before_s}});
     ASSERT_TRUE(fix.has_succeeded());
-    EXPECT_LT((found.rows[2].fix->pose.position_m - fix.estimate.pose.position_m).norm(), 1e-9);
+    EXPECT_LT((found.rows[2].fix->pose.position_m - fix.state.pose.position_m).norm(), 1e-9);
     input.captures[input.frames[1].image].time_s.reset();
   }
 }

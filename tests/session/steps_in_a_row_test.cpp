@@ -274,9 +274,9 @@ TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrorsOfFixes) {
       const Fix fix = positioner.compute_position_fix(with_noise(exact, random));
       const Fix without_noise = positioner.compute_position_fix(exact);
       ASSERT_TRUE(fix.has_succeeded() && without_noise.has_succeeded());
-      whole.add(compute_pose_error(fix, row.survey.truth.camera), fix.estimate.covariance);
+      whole.add(compute_pose_error(fix, row.survey.truth.camera), fix.pose_covariance());
       common.add(compute_pose_error(without_noise, row.survey.truth.camera),
-                 without_noise.estimate.covariance - without_noise.noise_covariance);
+                 (without_noise.covariance - without_noise.noise_covariance).topLeftCorner<4, 4>());
     }
   }
   // Fixes of one trial are correlated: three standard errors for `trials` trials.

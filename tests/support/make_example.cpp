@@ -9,8 +9,8 @@
 #include "captures/csv_writer.h"
 #include "captures/detections_table.h"
 #include "captures/number_text.h"
+#include "evaluation/floor_limits.h"
 #include "geometry/angles.h"
-#include "positioning/floor_limits.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {

@@ -31,8 +31,8 @@ struct NeesStatistics {
 /// Returns the error of X, Y, Z in meters and of the yaw in radians.
 inline Eigen::Vector4d compute_pose_error(const Fix& fix, const Pose& truth) {
   Eigen::Vector4d error;
-  error << fix.estimate.pose.position_m - truth.position_m,
-      wrap_angle_rad(fix.estimate.pose.yaw_rad - truth.yaw_rad);
+  error << fix.state.pose.position_m - truth.position_m,
+      wrap_angle_rad(fix.state.pose.yaw_rad - truth.yaw_rad);
   return error;
 }
 

@@ -80,8 +80,8 @@ std::optional<Pose> estimate_rough_pose(const std::vector<LampObservation>& sigh
   // Before estimate_body_state_robust(), which removes lamps from the frame.
   const BodySolution all = estimate_body_state_from_all_lamps(frame, problem);
   if (sightings.size() > 3) {
-    const auto [status, fix] = estimate_body_state_robust(frame, problem, max_residual_fraction);
-    if (status == FixStatus::ok) return fix.state.pose;
+    const BodySolution most = estimate_body_state_robust(frame, problem, max_residual_fraction);
+    if (most.status == FixStatus::ok) return most.fix.state.pose;
   }
   return all.status == FixStatus::ok ? std::optional(all.fix.state.pose) : std::nullopt;
 }

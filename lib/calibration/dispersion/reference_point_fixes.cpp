@@ -75,7 +75,7 @@ ReferencePointFixes::compute_capture_fixes_with_dispersion_offset(const Eigen::V
   for (std::size_t i = 0; i < captures_.size(); ++i) {
     const Fix fix = locate_camera_of_capture(positioner, captures_[i]);
     if (!fix.has_succeeded()) continue;
-    const Pose& pose = fix.estimate.pose;
+    const Pose& pose = fix.state.pose;
     fixes[i] = Estimate{pose.position_m.head<2>() - captures_[i].reference_point_m,
                         fix.noise_covariance.topLeftCorner<2, 2>(),
                         pose.yaw_rad,

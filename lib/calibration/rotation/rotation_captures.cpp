@@ -234,7 +234,7 @@ class RotationSearch {
       statuses_.push_back(fix.status);
       rejection_reasons_[i] = fix.has_succeeded() ? "" : describe_fix_status(fix.status);
       if (!fix.has_succeeded()) continue;
-      const Pose& pose = fix.estimate.pose;
+      const Pose& pose = fix.state.pose;
       fixes_.frames.push_back(i);
       fixes_.fixes.push_back({pose, lamps_z_m_ - pose.position_m.z(), 0});
       found.push_back(fix);

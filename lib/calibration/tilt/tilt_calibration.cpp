@@ -89,10 +89,10 @@ Placement locate_captures_separately(const std::vector<AdjustmentCapture>& captu
     for (const Detection& detection : placed.detections) {
       const Lamp* lamp = find_lamp_by_id(map.lamps, detection.lamp);
       ++placement.detection_counts[static_cast<std::size_t>(lamp - map.lamps.data())];
-      placement.height_m += lamp->position_m.z() - fix.estimate.pose.position_m.z();
+      placement.height_m += lamp->position_m.z() - fix.state.pose.position_m.z();
     }
     placement.squares_px2 += fix.lamps * fix.residual_px * fix.residual_px;
-    placement.poses.push_back(fix.estimate.pose);
+    placement.poses.push_back(fix.state.pose);
     placement.captures.push_back(std::move(placed));
   }
   placement.height_m /= std::max(1, placement.count_detections());

@@ -6,8 +6,8 @@
 
 #include "camera/lens.h"
 #include "captures/parallel_for.h"
+#include "evaluation/floor_limits.h"
 #include "positioning/error_budget.h"
-#include "positioning/floor_limits.h"
 
 namespace vlp {
 namespace {

@@ -6,8 +6,8 @@
 
 #include "evaluation/evaluation.h"
 #include "evaluation/fix_summary.h"
+#include "evaluation/floor_limits.h"
 #include "evaluation/gate.h"
-#include "positioning/floor_limits.h"
 
 namespace vlp {
 

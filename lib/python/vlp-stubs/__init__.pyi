@@ -59,6 +59,7 @@ class Sensors:
         yaw_rate_sd_rad_per_s: float = 0.0,
         height_m: tuple[float, float] | None = None,
         time_s: float | None = None,
+        prior: tuple[npt.ArrayLike, npt.ArrayLike] | None = None,
     ) -> None: ...
 
 class Fix:
@@ -73,19 +74,21 @@ class Fix:
     @property
     def yaw_rad(self) -> float: ...
     @property
+    def state(self) -> _Doubles: ...
+    @property
     def covariance(self) -> _Doubles: ...
     @property
     def noise_covariance(self) -> _Doubles: ...
     @property
-    def roll_pitch_rad(self) -> list[float] | None: ...
+    def candidates(self) -> list[tuple[_Doubles, float]]: ...
     @property
-    def velocity_m_per_s(self) -> list[float] | None: ...
+    def chi_squared(self) -> float: ...
+    @property
+    def redundancy(self) -> float: ...
     @property
     def residual_px(self) -> float: ...
     @property
     def lamps(self) -> int: ...
-    @property
-    def body_covariance(self) -> _Doubles | None: ...
     @property
     def rejected_lamps(self) -> int: ...
     @property
@@ -105,6 +108,14 @@ class Fixes(TypedDict):
     covariance: _Doubles
     residual_px: _Doubles
     lamps: _Integers
+
+class Residuals(TypedDict):
+    """Result of residuals()."""
+
+    use: list[str]
+    predicted_px: _Doubles
+    residual_px: _Doubles
+    jacobian: _Doubles
 
 class Positioner:
     def __init__(
@@ -134,6 +145,14 @@ class Positioner:
         sigma_px: npt.ArrayLike | None = None,
         sensors: Sensors = ...,
     ) -> Fixes: ...
+    def locate_image(
+        self,
+        detector: LampDetector,
+        image: npt.NDArray[np.uint8] | npt.NDArray[np.uint16],
+        sensors: Sensors = ...,
+    ) -> tuple[Fix, tuple[_Integers, _Doubles, _Doubles]]: ...
+    def project(self, lamp: int, state: npt.ArrayLike) -> tuple[_Doubles, _Doubles]: ...
+    def residuals(self, lamps: npt.ArrayLike, pixels: npt.ArrayLike, fix: Fix) -> Residuals: ...
 
 class LampDetector:
     def __init__(

@@ -63,7 +63,7 @@ std::vector<PositionError> compute_position_errors(std::span<const Frame> frames
     if (entry == places.end() || entry->second.measured_point == MeasuredPoint::axis) continue;
     const Capture& place = entry->second;
     if (!place.x_m || !place.y_m) continue;
-    const auto& pose = fix.estimate.pose;
+    const auto& pose = fix.state.pose;
     errors.push_back({frames[i].image,
                       pose.position_m.head<2>() - Eigen::Vector2d(*place.x_m, *place.y_m),
                       pose.yaw_rad, i});
@@ -114,8 +114,8 @@ std::optional<HeightErrors> compute_height_errors(const CapturesWithPositions& c
   for (const auto& [i, fix] : locate_by_three_lamps(captures.frames, map, calibration)) {
     const auto place = captures.positions.find(captures.frames[i].image);
     if (place == captures.positions.end() || !place->second.z_m) continue;
-    errors_m.push_back(fix.estimate.pose.position_m.z() - *place->second.z_m);
-    sds_m.push_back(std::sqrt(fix.estimate.covariance(2, 2)));
+    errors_m.push_back(fix.state.pose.position_m.z() - *place->second.z_m);
+    sds_m.push_back(std::sqrt(fix.pose_covariance()(2, 2)));
   }
   if (errors_m.size() < min_heights) return std::nullopt;
   return HeightErrors{upper_median(errors_m), upper_median(sds_m)};

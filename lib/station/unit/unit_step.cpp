@@ -90,7 +90,7 @@ std::vector<LocatedFrame> locate_camera_in_frames(const std::vector<Frame>& fram
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Fix fix = positioner.compute_position_fix(frames[i].detections);
     if (!fix.has_succeeded()) continue;
-    const auto& pose = fix.estimate.pose;
+    const auto& pose = fix.state.pose;
     located.push_back({pose.position_m.z(), ceiling_m - pose.position_m.z(), pose.yaw_rad, i});
   }
   std::ranges::sort(located, {}, &LocatedFrame::z_m);

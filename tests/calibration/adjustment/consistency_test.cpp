@@ -77,9 +77,9 @@ TEST_P(RunBundleAdjustmentCovariance, FixCovarianceMatchesFixErrorsAfterAdjustme
       const Fix without_noise = positioner.compute_position_fix(exact);
       ASSERT_TRUE(fix.has_succeeded() && without_noise.has_succeeded());
       EXPECT_EQ(fix.rejected_lamps, 0);
-      whole.add(compute_pose_error(fix, survey.truth.camera), fix.estimate.covariance);
+      whole.add(compute_pose_error(fix, survey.truth.camera), fix.pose_covariance());
       common.add(compute_pose_error(without_noise, survey.truth.camera),
-                 without_noise.estimate.covariance - without_noise.noise_covariance);
+                 (without_noise.covariance - without_noise.noise_covariance).topLeftCorner<4, 4>());
     }
   }
   for (const NeesStatistics& judged : {whole, common}) {

@@ -346,10 +346,10 @@ TEST_P(PositionerAfterDispersion, FixCovarianceMatchesErrorsUnderSameAndOtherLam
       ASSERT_TRUE(fix.has_succeeded());
       const Fix same = independent.compute_position_fix(detections);
       for (int axis = 0; axis < 2; ++axis) {
-        const double error_m = fix.estimate.pose.position_m[axis] - place.camera.position_m[axis];
-        place.squares += error_m * error_m / fix.estimate.covariance(axis, axis);
-        place.variance += fix.estimate.covariance(axis, axis);
-        place.variance_without_lamps += same.estimate.covariance(axis, axis);
+        const double error_m = fix.state.pose.position_m[axis] - place.camera.position_m[axis];
+        place.squares += error_m * error_m / fix.pose_covariance()(axis, axis);
+        place.variance += fix.pose_covariance()(axis, axis);
+        place.variance_without_lamps += same.pose_covariance()(axis, axis);
         ++place.count;
       }
     }

@@ -38,7 +38,7 @@ TEST(EstimateDispersionOffset, CameraMethodRecoversWorldOffsetAndCorrectsFixesEx
                             random.uniform(-3, 3)};
       const Fix fix = positioner.compute_position_fix(seen_from(station.rig));
       ASSERT_TRUE(fix.has_succeeded());
-      EXPECT_THAT(fix.estimate.pose.position_m, IsNear(station.rig.camera.position_m, 1e-8));
+      EXPECT_THAT(fix.state.pose.position_m, IsNear(station.rig.camera.position_m, 1e-8));
     }
   }
 }

@@ -278,9 +278,8 @@ TEST(ReferencePointFixes, StatisticsMatchPositionerForNoisyDetections) {
                 IsNear(Eigen::Matrix2d(fix.noise_covariance.topLeftCorner<2, 2>()), 1e-15));
     EXPECT_NEAR(found[i]->squared_residuals_px2, 8 * fix.residual_px * fix.residual_px, 1e-9);
     EXPECT_GT(found[i]->squared_residuals_px2, 1e-3);
-    EXPECT_THAT(
-        found[i]->error_m,
-        IsNear(fix.estimate.pose.position_m.head<2>() - captures[i].reference_point_m, 1e-12));
+    EXPECT_THAT(found[i]->error_m,
+                IsNear(fix.state.pose.position_m.head<2>() - captures[i].reference_point_m, 1e-12));
   }
 }
 

@@ -115,7 +115,7 @@ TEST(FitRotationAxis, CalibrationFromOneHeightHasNoLeverArmAndYieldsFixesAtAxis)
   for (const Frame& frame : scene.frames()) {
     const Fix fix = positioner.compute_position_fix(frame.detections);
     ASSERT_TRUE(fix.has_succeeded());
-    const Eigen::Vector2d place_m = fix.estimate.pose.position_m.head<2>();
+    const Eigen::Vector2d place_m = fix.state.pose.position_m.head<2>();
     EXPECT_THAT(place_m, IsNear(scene.axis_m, 0.1 * scene.lever_arm_m.norm()));
   }
 }

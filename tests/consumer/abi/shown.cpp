@@ -5,6 +5,7 @@
 #include <vlp/vlp.h>
 
 #include <vlp/lamps/lamp_detector.h>
+#include <vlp/positioning/image_fix.h>
 #include <vlp/positioning/positioner.h>
 #include <vlp/rig/input_error.h>
 #include <optional>
@@ -46,16 +47,26 @@ struct Types {
   InputError* error;
   Fix fix;
   FixStatus status;
-  BodyEstimate body;
+  BodyState body;
+  ImageFix image_fix;
+  StatePrior prior;
+  BodyMotion body_motion;
   BodyIndex index;
-  PoseEstimate estimate;
+  FixCandidate candidate;
+  LampProjection projection;
+  DetectionUse use;
+  DetectionResidual residual;
   Pose pose;
   Inclination inclination;
   vlp_options c_options;
   vlp_image c_image;
   vlp_detection c_detection;
   vlp_sensors c_sensors;
+  vlp_state c_state;
+  vlp_prior c_prior;
+  vlp_candidate c_candidate;
   vlp_fix c_fix;
+  vlp_residual c_residual;
   vlp_earlier_frame c_earlier;
 };
 
@@ -85,14 +96,27 @@ struct Functions {
       const noexcept = &Positioner::compute_position_fix;
   std::vector<Detection> (LampDetector::*detect)(const ImageView&) const =
       &LampDetector::detect_lamps;
+  std::vector<Detection> (LampDetector::*detect_in_plane)(
+      const ImageView&, const std::optional<Eigen::Matrix3d>&) const = &LampDetector::detect_lamps;
+  decltype(&locate_with_repeated_detection) repeat = &locate_with_repeated_detection;
+  decltype(&locate_camera_in_image) locate_image = &locate_camera_in_image;
+  Eigen::Matrix3d (Positioner::*level)(const Inclination&) const =
+      &Positioner::compute_level_from_camera;
+  LampProjection (Positioner::*project)(int, const BodyState&) const noexcept =
+      &Positioner::project_lamp;
+  DetectionResidual (Positioner::*compare)(const Detection&, const Fix&) const noexcept =
+      &Positioner::compute_detection_residual;
   int (Positioner::*elsewhere)() const noexcept = &Positioner::num_lamps_moved_since_calibration;
   decltype(&vlp_version) c_version = &vlp_version;
   decltype(&vlp_open) c_open = &vlp_open;
   decltype(&vlp_open_room) c_open_room = &vlp_open_room;
   decltype(&vlp_close) c_close = &vlp_close;
   decltype(&vlp_detect) c_detect = &vlp_detect;
+  decltype(&vlp_locate_image) c_locate_image = &vlp_locate_image;
   decltype(&vlp_locate) c_locate = &vlp_locate;
   decltype(&vlp_locate_with_earlier) c_locate_with_earlier = &vlp_locate_with_earlier;
+  decltype(&vlp_project) c_project = &vlp_project;
+  decltype(&vlp_compute_residuals) c_compute_residuals = &vlp_compute_residuals;
   decltype(&vlp_describe_status) c_explanation = &vlp_describe_status;
   decltype(&vlp_last_error) c_last_error = &vlp_last_error;
 };

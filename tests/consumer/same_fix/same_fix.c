@@ -12,16 +12,15 @@ static const vlp_detection kSeen[] = {{1, 331.4048, 303.6158, 0.05},
                                       {3, 677.3313, 499.7995, 0.05},
                                       {4, 335.0629, 517.9374, 0},
                                       {5, 545.7014, 421.0321, 0.05}};
-static const int kPose[] = {0, 1, 2, 5};
 
 static void print(const vlp_fix* fix) {
   int i, k;
-  printf("%d %a %a %a %a\n", (int)fix->status, fix->position_m[0], fix->position_m[1],
-         fix->position_m[2], fix->yaw_rad);
-  for (i = 0; i < 4; ++i) {
-    for (k = 0; k < 4; ++k) printf("%a ", fix->covariance[6 * kPose[i] + kPose[k]]);
+  printf("%d %a %a %a %a\n", (int)fix->status, fix->state.position_m[0],
+         fix->state.position_m[1], fix->state.position_m[2], fix->state.yaw_rad);
+  for (i = 0; i < VLP_STATES; ++i) {
+    for (k = 0; k < VLP_STATES; ++k) printf("%a ", fix->covariance[VLP_STATES * i + k]);
   }
-  printf("\n%a %a %a\n", fix->roll_rad, fix->pitch_rad, fix->covariance[6 * 3 + 4]);
+  printf("\n%a %a\n", fix->state.roll_rad, fix->state.pitch_rad);
 }
 
 int main(void) {

@@ -10,15 +10,13 @@
 namespace {
 
 void print(const vlp::Fix& fix) {
-  const auto& [pose, covariance] = fix.estimate;
+  const auto& [pose, motion] = fix.state;
   std::printf("%d %a %a %a %a\n", static_cast<int>(fix.status), pose.position_m.x(),
               pose.position_m.y(), pose.position_m.z(), pose.yaw_rad);
-  for (int i = 0; i < 4; ++i) {
-    for (int k = 0; k < 4; ++k) std::printf("%a ", covariance(i, k));
+  for (int i = 0; i < vlp::kBodyStates; ++i) {
+    for (int k = 0; k < vlp::kBodyStates; ++k) std::printf("%a ", fix.covariance(i, k));
   }
-  const vlp::BodyEstimate body = fix.body.value_or(vlp::BodyEstimate());
-  std::printf("\n%a %a %a\n", body.inclination.roll_rad, body.inclination.pitch_rad,
-              body.covariance(vlp::kBodyRoll, vlp::kBodyPitch));
+  std::printf("\n%a %a\n", motion.inclination.roll_rad, motion.inclination.pitch_rad);
 }
 
 }  // namespace

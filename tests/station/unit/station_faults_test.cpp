@@ -111,8 +111,8 @@ struct PlaceFault : LampFaults {
       const Fix fix = positioner.compute_position_fix(frame.detections);
       if (!fix.has_succeeded()) continue;
       Capture& place = places[frame.image];
-      place.x_m = fix.estimate.pose.position_m.x() + 3e-4;
-      place.y_m = fix.estimate.pose.position_m.y();
+      place.x_m = fix.state.pose.position_m.x() + 3e-4;
+      place.y_m = fix.state.pose.position_m.y();
     }
   }
   CapturesTable places;
@@ -158,7 +158,7 @@ TEST_F(PlaceFault, FindCommonPositionOffsetDistinguishesCameraFromRoomFrame) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const Fix fix = positioner.compute_position_fix(frames[i].detections);
     if (!fix.has_succeeded()) continue;
-    const double yaw_rad = fix.estimate.pose.yaw_rad;
+    const double yaw_rad = fix.state.pose.yaw_rad;
     rotating.at(frames[i].image).x_m.value() += 0.03 * std::cos(yaw_rad);
     rotating.at(frames[i].image).y_m.value() += 0.03 * std::sin(yaw_rad);
     constant.at(frames[i].image).x_m.value() += 0.03;
@@ -237,7 +237,7 @@ struct OtherCamera : LensFault {
       const Fix fix = positioner.compute_position_fix(frames[i].detections);
       if (!fix.has_succeeded()) continue;
       CapturesWithPositions& captures = i % 2 == 0 ? reference : check;
-      captures.positions[frames[i].image].z_m = fix.estimate.pose.position_m.z();
+      captures.positions[frames[i].image].z_m = fix.state.pose.position_m.z();
       captures.frames.push_back(frames[i]);
     }
   }

@@ -7,11 +7,11 @@
 #include <string_view>
 #include <vector>
 
-#include "../geometry/frames.h"
-#include "../rig/calibration.h"
-#include "../rig/lamp_map.h"
-#include "error_budget.h"
-#include "unit_errors.h"
+#include "evaluation/unit_errors.h"
+#include "geometry/frames.h"
+#include "positioning/error_budget.h"
+#include "rig/calibration.h"
+#include "rig/lamp_map.h"
 
 namespace vlp {
 

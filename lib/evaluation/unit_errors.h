@@ -9,13 +9,13 @@
 #include <span>
 #include <vector>
 
-#include "../camera/lens.h"
-#include "../geometry/frames.h"
-#include "../geometry/types.h"
-#include "../rig/calibration.h"
-#include "../rig/lamp_map.h"
-#include "correlated_errors.h"
-#include "pose_estimation.h"
+#include "camera/lens.h"
+#include "geometry/frames.h"
+#include "geometry/types.h"
+#include "positioning/correlated_errors.h"
+#include "positioning/pose_estimation.h"
+#include "rig/calibration.h"
+#include "rig/lamp_map.h"
 
 namespace vlp {
 

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "positioning/floor_limits.h"
+#include "evaluation/floor_limits.h"
 
 #include <algorithm>
 #include <cmath>
@@ -59,7 +59,7 @@ constexpr Source kLampMap{"lamp map", "lamp_map"};
 std::vector<Source> list_image_error_sources(const BodyPrior& prior) {
   std::vector<Source> sources{{"noise", "noise"}};
   if (prior.is_motion_estimated()) sources.push_back({"motion", "motion"});
-  if (prior.inclination_sd_rad > 0) sources.push_back({"roll and pitch", "roll_pitch"});
+  if (prior.is_tilt_estimated()) sources.push_back({"roll and pitch", "roll_pitch"});
   return sources;
 }
 
@@ -68,7 +68,7 @@ std::vector<Matrix4> split_covariance_by_image_source(const Budget& budget,
                                                       const BodyPrior& prior) {
   std::vector<Matrix4> parts{budget.noise};
   if (prior.is_motion_estimated()) parts.push_back(budget.motion);
-  if (prior.inclination_sd_rad > 0) parts.push_back(budget.roll_pitch);
+  if (prior.is_tilt_estimated()) parts.push_back(budget.roll_pitch);
   return parts;
 }
 

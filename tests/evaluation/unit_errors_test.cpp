@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Compares the budget of a camera with the covariance of its fixes, with fixes of drawn errors,
 /// and part by part.
-#include "positioning/unit_errors.h"
+#include "evaluation/unit_errors.h"
 
 #include <gtest/gtest.h>
 
@@ -11,8 +11,8 @@
 #include <span>
 #include <vector>
 
+#include "evaluation/floor_limits.h"
 #include "geometry/symmetric.h"
-#include "positioning/floor_limits.h"
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
 #include "rig/calibration_error.h"
@@ -69,14 +69,17 @@ TEST_P(UnitErrorsParts, BudgetTermsSumToFixCovarianceOfLevelCamera) {
   ASSERT_TRUE(fix.has_succeeded());
   ASSERT_EQ(fix.lamps, 8);
   const UnitBudget budget = compute_unit_fix_error_budget(rig);
-  const Eigen::Matrix4d common = fix.estimate.covariance - fix.noise_covariance;
-  const Eigen::Vector4d sd = fix.estimate.covariance.diagonal().cwiseSqrt();
+  const Eigen::Matrix4d common = (fix.covariance - fix.noise_covariance).topLeftCorner<4, 4>();
+  const Eigen::Vector4d sd = fix.pose_covariance().diagonal().cwiseSqrt();
   const Eigen::Matrix4d scale = sd * sd.transpose();
   // Convergence tolerance of the fix.
   constexpr double stopped = 1e-8;
   EXPECT_LT((budget.common_covariance() - common).cwiseQuotient(scale).cwiseAbs().maxCoeff(),
             stopped);
-  EXPECT_LT((budget.noise - fix.noise_covariance).cwiseQuotient(scale).cwiseAbs().maxCoeff(),
+  EXPECT_LT((budget.noise - fix.noise_covariance.topLeftCorner<4, 4>())
+                .cwiseQuotient(scale)
+                .cwiseAbs()
+                .maxCoeff(),
             stopped);
   EXPECT_EQ(budget.total_pose_covariance(), Matrix4(budget.noise + budget.common_covariance()));
 }
@@ -94,23 +97,25 @@ TEST_P(UnitErrorsParts, BudgetTermsSumToFixCovarianceWithUnknownMotion) {
   ASSERT_TRUE(fix.has_succeeded());
   ASSERT_EQ(fix.lamps, 8);
   BodyPrior prior;
-  prior.velocity_sd_m_per_s = 1;
-  prior.yaw_rate_sd_rad_per_s = 0.5;
-  prior.inclination_sd_rad = 0.1;
+  prior.set_sd(kBodyVelocity, 1);
+  prior.set_sd(kBodyYawRate, 0.5);
+  prior.set_sd(kBodyRoll, 0.1);
   const auto budget = UnitErrors(rig.map, rig.calibration)
                           .compute_unit_fix_error_budget(rig.camera, all_lamps(), kNoise_px, prior);
   ASSERT_TRUE(budget);
-  const Eigen::Vector4d sd = fix.estimate.covariance.diagonal().cwiseSqrt();
+  const Eigen::Vector4d sd = fix.pose_covariance().diagonal().cwiseSqrt();
   const Eigen::Matrix4d scale = sd * sd.transpose();
   constexpr double stopped = 1e-6;
   const auto differ = [&](const Eigen::Matrix4d& a, const Eigen::Matrix4d& b) {
     return (a - b).cwiseQuotient(scale).cwiseAbs().maxCoeff();
   };
-  EXPECT_LT(differ(budget->noise + budget->motion + budget->roll_pitch, fix.noise_covariance),
+  EXPECT_LT(differ(budget->noise + budget->motion + budget->roll_pitch,
+                   fix.noise_covariance.topLeftCorner<4, 4>()),
             stopped);
-  EXPECT_LT(differ(budget->common_covariance(), fix.estimate.covariance - fix.noise_covariance),
+  EXPECT_LT(differ(budget->common_covariance(),
+                   (fix.covariance - fix.noise_covariance).topLeftCorner<4, 4>()),
             stopped);
-  EXPECT_LT(differ(budget->total_pose_covariance(), fix.estimate.covariance), stopped);
+  EXPECT_LT(differ(budget->total_pose_covariance(), fix.pose_covariance()), stopped);
   EXPECT_GT(budget->roll_pitch(0, 0), budget->noise(0, 0)) << "unknown roll and pitch cost much";
 }
 
@@ -276,7 +281,7 @@ TEST(UnitErrors, BudgetIsNulloptUnlessThereAre2To256Lamps) {
   rig.calibration.camera.row_time_s = 55e-6;
   rig.calibration.camera.readout = Readout::rows;
   BodyPrior prior;
-  prior.velocity_sd_m_per_s = 1;
+  prior.set_sd(kBodyVelocity, 1);
   const UnitErrors unit(rig.map, rig.calibration);
   std::vector<std::size_t> lamps(300);
   std::iota(lamps.begin(), lamps.end(), 0U);

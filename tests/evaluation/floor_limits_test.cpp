@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "positioning/floor_limits.h"
+#include "evaluation/floor_limits.h"
 
 #include <gtest/gtest.h>
 
@@ -72,8 +72,8 @@ TEST(ComputeAccuracyLimitsOnFloor, TotalVarianceIncreasesWhenMotionAndTiltAreEst
   camera.row_time_s = 3e-5;
   camera.readout = Readout::rows;
   BodyPrior prior;
-  prior.velocity_sd_m_per_s = 1;
-  prior.inclination_sd_rad = 2;
+  prior.set_sd(kBodyVelocity, 1);
+  prior.set_sd(kBodyRoll, 2);
   const FloorGrid grid{-1.5, 1.5, -0.3, 0.3, 0.3};
   const auto standing =
       compute_accuracy_limits_on_floor(synthetic_lamps(), camera, grid, 0.2, 0, kNoise);
@@ -120,7 +120,7 @@ TEST(ComputeAccuracyLimitsOnFloor, NoiseCovarianceMatchesScatterOfFixesWithFishe
     const auto exact = seen_from(rig, kNoise.noise_px);
     Scatter scatter(place.camera, place.covariances[0]);
     for (int i = 0; i < draws; ++i) {
-      scatter.add(positioner.compute_position_fix(with_noise(exact, random)).estimate.pose);
+      scatter.add(positioner.compute_position_fix(with_noise(exact, random)).state.pose);
     }
     // Four standard deviations of a standard deviation from `draws` draws.
     EXPECT_LT(scatter.excess().cwiseAbs().maxCoeff(), 4 / std::sqrt(2.0 * draws));
