@@ -56,13 +56,14 @@ int main(int argc, char** argv) {
       {"Detections, detections.csv: image, lamp, u_px, v_px [, sigma_px]; or a folder of images",
        "Calibration of the camera. Its rotation center, if any, is replaced",
        "Output file of the calibration with its rotation center, YAML"});
-  app.add_option("--method", options.method,
-                 "Method. axis (default): common rotation axis of all lamp rays, exact for tilt "
-                 "and lens. joint: one center for all lamps in the undistorted image. circle: mean "
-                 "center of one circle per lamp. lamps: tilt from captures at any position, also "
-                 "while driving, with three visible lamps or more")
-      ->check(CLI::IsMember({"axis", "joint", "circle", "lamps"}))
-      ->option_text("axis|joint|circle|lamps");
+  app.add_option(
+         "--method", options.method,
+         "Method. axis (default): common rotation axis of all lamp rays, exact for tilt "
+         "and lens. circle: mean center of one circle per lamp in the undistorted image. "
+         "lamps: tilt from captures at any position, also while driving, with three visible "
+         "lamps or more")
+      ->check(CLI::IsMember({"axis", "circle", "lamps"}))
+      ->option_text("axis|circle|lamps");
   app.add_option("--refine-map", options.level.refined_map,
                  "Output file of the corrected lamp map, YAML. Position, yaw and scale of the map "
                  "as a whole stay fixed. Only with --method lamps")

@@ -32,8 +32,6 @@ RotationFit fit_rotation(const RotationCaptures& rotation, const Camera& camera,
   switch (method) {
     case RotationMethod::axis:
       return fit_rotation_axis(rotation, camera);
-    case RotationMethod::joint:
-      return fit_rotation_center_to_all_lamps(rotation, camera);
     case RotationMethod::circle:
       break;
   }
@@ -240,7 +238,7 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
     result.set_step_failure(
         StepFailure::undetermined,
         is_noise ? "noise determines most circles, as with captures at two yaws: add captures at "
-                   "other yaws, preferably twelve over a full turn, or use --method joint"
+                   "other yaws, preferably twelve over a full turn, or use --method axis"
                  : "no rotation center fits the captures: take them at one position per height, "
                    "over more of the turn, with more visible lamps, and check lens and lamp map");
     explain_failure_by_lamp_map_errors(input, extract_camera_only_calibration(input.calibration),

@@ -34,15 +34,12 @@ void explain_failure_by_lamp_map_errors(const LampCaptures& input, const Calibra
 /// Estimator of the rotation center.
 enum class RotationMethod {
   axis,   // fit_rotation_axis()
-  joint,  // fit_rotation_center_to_all_lamps()
   circle  // fit_and_average_lamp_circle_centers()
 };
 
 /// Names of the estimators on the command line and in plots.
-inline constexpr std::array<std::pair<std::string_view, RotationMethod>, 3> kRotationMethods{
-    {{"axis", RotationMethod::axis},
-     {"joint", RotationMethod::joint},
-     {"circle", RotationMethod::circle}}};
+inline constexpr std::array<std::pair<std::string_view, RotationMethod>, 2> kRotationMethods{
+    {{"axis", RotationMethod::axis}, {"circle", RotationMethod::circle}}};
 
 /// Formats a height in meters, without a sign if it rounds to zero.
 std::string format_height_m(double z_m);

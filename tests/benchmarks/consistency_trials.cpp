@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// consistency_trials [DRAWS [METHOD]]: compares the standard deviations that each method reports
 /// with its errors, over synthetic captures with known truth. DRAWS per cell is 200; METHOD is one
-/// of `joint`, `circle`, `axis`, `lamps`, `dispersion-camera`, `dispersion-paper`, `adjust`,
+/// of `circle`, `axis`, `lamps`, `dispersion-camera`, `dispersion-paper`, `adjust`,
 /// `locate`, or all of them by default.
 ///
 /// A cell is a map error, a number of captures, the headings of the camera and the reported noise
@@ -211,7 +211,7 @@ NormalizedErrors normalize(const Eigen::VectorXd& error, const Eigen::MatrixXd& 
   return normalized;
 }
 
-/// Returns true unless a warning is the one about the lever arm, which `joint` and `circle` give
+/// Returns true unless a warning is the one about the lever arm, which `circle` gives
 /// for all captures.
 bool has_warning(const StepResult& result) {
   return std::ranges::any_of(result.warnings, [](const std::string& warning) {
@@ -258,18 +258,10 @@ Trial try_rotation(const Cell& cell, Random& random, RotationMethod method, doub
   return trial;
 }
 
-/// Level camera on its axis, for which `joint` and `circle` are exact.
-Trial try_level_rotation(const Cell& cell, Random& random, RotationMethod method) {
-  return try_rotation(cell, random, method, 0,
-                      {.lever_arm_m = Eigen::Vector2d::Zero(), .heights_m = {0}});
-}
-
-Trial try_joint(const Cell& cell, Random& random) {
-  return try_level_rotation(cell, random, RotationMethod::joint);
-}
-
+/// Level camera on its axis, for which `circle` is exact.
 Trial try_circle(const Cell& cell, Random& random) {
-  return try_level_rotation(cell, random, RotationMethod::circle);
+  return try_rotation(cell, random, RotationMethod::circle, 0,
+                      {.lever_arm_m = Eigen::Vector2d::Zero(), .heights_m = {0}});
 }
 
 Trial try_axis(const Cell& cell, Random& random) {
@@ -402,8 +394,7 @@ struct Method {
 };
 
 std::vector<Method> make_methods() {
-  return {{"joint", {{"center", 2}}, try_joint},
-          {"circle", {{"center", 2}}, try_circle},
+  return {{"circle", {{"center", 2}}, try_circle},
           {"axis", {{"zenith", 2}, {"lever arm", 2}}, try_axis},
           {"lamps", {{"zenith", 2}}, try_lamps},
           {"dispersion-camera", {{"offset", 2}}, try_camera_dispersion},

@@ -17,7 +17,7 @@ class VlpRotationRefusals : public VlpRotation {
   /// With `lamps` as the map, by each method.
   void expect_refusals(const std::string& message) {
     write_lamp_map(folder / "other.yaml", lamps);
-    for (const std::string method : {"axis", "joint", "circle", "lamps"}) {
+    for (const std::string method : {"axis", "circle", "lamps"}) {
       SCOPED_TRACE(method);
       expect_refusal(run_program("vlp-rotation " + kExample + "turning.csv --lamps " +
                                  (folder / "other.yaml").string() + " --calibration " + kExample +

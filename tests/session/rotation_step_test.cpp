@@ -103,9 +103,9 @@ TEST(RunRotationCalibrationStep, WarnsThatLeverArmIsNotEstimatedFromOneHeight) {
   EXPECT_FALSE(find_metric_value(axis.metrics, "lever_arm_mm"));
   camera.rotate(0.6, 8);
   EXPECT_THAT(camera.calibrate().warnings, IsEmpty());
-  const RotationResult joint = camera.calibrate(RotationMethod::joint);
-  ASSERT_TRUE(joint.has_succeeded()) << joint.message;
-  EXPECT_THAT(joint.warnings,
+  const RotationResult circle = camera.calibrate(RotationMethod::circle);
+  ASSERT_TRUE(circle.has_succeeded()) << circle.message;
+  EXPECT_THAT(circle.warnings,
               Contains(HasSubstr("this method assumes a lever arm of zero, and the center is a "
                                  "mean over 2 heights: use --method axis")));
 }

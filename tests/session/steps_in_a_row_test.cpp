@@ -159,7 +159,7 @@ TEST(RunDispersionCalibrationStep, OffsetCovarianceIncludesLeverArmCovarianceFor
 
 /// Rotations at yaws that barely determine the circles. A lens error changes the set of determined
 /// circles, which moves their mean by up to 14 times the effect of the error itself.
-TEST(RunRotationCalibrationStep, CircleMethodErrorFromLensIsWithin50PercentOfJointMethod) {
+TEST(RunRotationCalibrationStep, CircleMethodErrorFromLensIsWithin70PercentOfAxisMethod) {
   constexpr double spread_rad = 6e-4;  // a few times what the noise turns a lamp by
   for (const unsigned seed : {44U, 127U, 144U, 223U, 227U}) {
     Random random(seed);
@@ -176,17 +176,17 @@ TEST(RunRotationCalibrationStep, CircleMethodErrorFromLensIsWithin50PercentOfJoi
       turn.frames.push_back({capture.name, capture.detections});
     }
     const RotationResult circle = run_rotation_calibration_step(turn, RotationMethod::circle, {});
-    const RotationResult joint = run_rotation_calibration_step(turn, RotationMethod::joint, {});
-    ASSERT_TRUE(joint.has_succeeded());
+    const RotationResult axis = run_rotation_calibration_step(turn, RotationMethod::axis, {});
+    ASSERT_TRUE(axis.has_succeeded());
     ASSERT_TRUE(circle.has_succeeded());
-    ASSERT_TRUE(joint.fit.center.jacobian_wrt_intrinsics);
+    ASSERT_TRUE(axis.fit.center.jacobian_wrt_intrinsics);
     ASSERT_TRUE(circle.fit.center.jacobian_wrt_intrinsics);
     const auto compute_sd = [&](const RotationFit& fit) {
       const auto& jacobian = *fit.center.jacobian_wrt_intrinsics;
       return std::sqrt((jacobian * covariance * jacobian.transpose()).trace());
     };
-    EXPECT_LT(compute_sd(circle.fit), 1.5 * compute_sd(joint.fit)) << seed;
-    EXPECT_GT(compute_sd(circle.fit), 0.5 * compute_sd(joint.fit)) << seed;
+    EXPECT_LT(compute_sd(circle.fit), 1.7 * compute_sd(axis.fit)) << seed;
+    EXPECT_GT(compute_sd(circle.fit), 0.3 * compute_sd(axis.fit)) << seed;
   }
 }
 

@@ -5,7 +5,6 @@
 #include <fmt/core.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -47,6 +46,8 @@ struct AssembledProblem {
   std::vector<AdjustmentResult::PositionResidual> known_positions = {};
   std::vector<double> position_sd_m = {};
   std::vector<bool> lamp_seen = {};
+  /// Index in the input of each capture of the problem.
+  std::vector<std::size_t> capture_indices = {};
   int rejected_captures = 0;
   bool noise_is_stated = true;
 };
@@ -86,27 +87,35 @@ std::optional<Pose> estimate_rough_pose(const std::vector<LampObservation>& sigh
   return all.status == FixStatus::ok ? std::optional(all.fix.state.pose) : std::nullopt;
 }
 
-/// Returns an orthonormal basis of translation, yaw and scale of the detected lamps, divided by the
-/// standard deviation of the constraint.
+/// Returns the directions of yaw, scale and translation of the detected lamps, each divided by the
+/// standard deviation of its constraint. With MapPrior::heights they are horizontal, and the scale
+/// has the standard deviation that follows from sd_m.
 Eigen::MatrixXd make_gauge(const std::vector<Eigen::Vector3d>& lamps_m,
-                           const std::vector<bool>& seen) {
-  constexpr double constraint_sd_m = 1e-6;  // far below the sd of lamps, and far above rounding
+                           const std::vector<bool>& seen, const AdjustmentInput& input) {
+  constexpr double min_sd_m = 1e-6;  // far below the sd of lamps, and far above rounding
+  const bool is_plan = input.map_prior == MapPrior::heights;
   Eigen::Vector3d mean_m = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (seen[i]) mean_m += lamps_m[i];
   }
   mean_m /= static_cast<double>(std::count(seen.begin(), seen.end(), true));
-  Eigen::MatrixXd gauge = Eigen::MatrixXd::Zero(3 * std::ssize(lamps_m), 5);
+  Eigen::MatrixXd gauge = Eigen::MatrixXd::Zero(3 * std::ssize(lamps_m), is_plan ? 4 : 5);
+  Eigen::VectorXd variances = Eigen::VectorXd::Zero(gauge.cols());
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (!seen[i]) continue;
-    const Eigen::Vector3d p = lamps_m[i] - mean_m;
+    Eigen::Vector3d p = lamps_m[i] - mean_m;
+    if (is_plan) p.z() = 0;
     auto lamp_rows = gauge.middleRows<3>(3 * static_cast<Eigen::Index>(i));
-    lamp_rows.leftCols<3>().setIdentity();
-    lamp_rows.col(3) = Eigen::Vector3d(-p.y(), p.x(), 0);
-    lamp_rows.col(4) = p;
+    lamp_rows.col(0) = Eigen::Vector3d(-p.y(), p.x(), 0);
+    lamp_rows.col(1) = p;
+    lamp_rows.rightCols(gauge.cols() - 2).setIdentity();
+    if (is_plan)
+      variances[1] += p.squaredNorm() * std::pow(input.lamps.lamps[i].sd_m.value_or(0), 2);
   }
-  const Eigen::HouseholderQR<Eigen::MatrixXd> qr(gauge);
-  return qr.householderQ() * Eigen::MatrixXd::Identity(gauge.rows(), 5) / constraint_sd_m;
+  // The directions are orthogonal, because p is relative to the mean.
+  const Eigen::VectorXd norms = gauge.colwise().norm().cwiseMax(min_sd_m);
+  const Eigen::VectorXd sd_m = variances.cwiseSqrt().cwiseQuotient(norms).cwiseMax(min_sd_m);
+  return gauge * norms.cwiseProduct(sd_m).cwiseInverse().asDiagonal();
 }
 
 /// Returns the derivative of a pixel of the undistorted image with respect to the pixel of the ray.
@@ -145,16 +154,23 @@ class ProblemAssembler {
   }
 
   /// Adds a capture with its known position; counts it as rejected if it determines no pose.
-  void add_capture_or_count_as_rejected(const AdjustmentCapture& capture) {
+  void add_capture_or_count_as_rejected(std::size_t input_index) {
+    const AdjustmentCapture& capture = input_.captures[input_index];
     const Eigen::Matrix3d level_from_base =
         level_rotation_from_inclination(capture.inclination.value_or(Inclination{0, 0}));
     CaptureLamps lamps = find_lamps(capture, level_from_base);
-    const auto pose = estimate_rough_pose(lamps.sightings, lamps.indices, lamps_m_);
+    auto pose = capture.initial_pose;
+    if (pose) {
+      pose->position_m -= all_.origin_m;
+    } else {
+      pose = estimate_rough_pose(lamps.sightings, lamps.indices, lamps_m_);
+    }
     if (!pose) {
       ++all_.rejected_captures;
       return;
     }
     const std::size_t index = problem_.captures.size();
+    all_.capture_indices.push_back(input_index);
     problem_.add_capture_with_initial_pose(
         {add_to_pivot(capture, *pose), level_from_base.transpose(), capture.motion}, *pose);
     for (auto& term : lamps.terms) {
@@ -173,7 +189,8 @@ class ProblemAssembler {
           std::sqrt(static_cast<double>(all_.known_positions[place.known_position].captures));
     }
     problem_.is_known_position_used.assign(all_.known_positions.size(), true);
-    if (input_.frees_map_shape) problem_.gauge = make_gauge(lamps_m_, all_.lamp_seen);
+    if (input_.map_prior != MapPrior::survey)
+      problem_.gauge = make_gauge(lamps_m_, all_.lamp_seen, input_);
     for (std::size_t i = 0; i < sums_m_.size(); ++i) {
       problem_.state_vector().segment<3>(problem_.state_vector_layout().pivot_state_index(i)) =
           sums_m_[i] / std::max(1, num_captures_[i]);
@@ -206,7 +223,8 @@ class ProblemAssembler {
       problem_.state_vector().segment<3>(
           problem_.state_vector_layout().lamp_state_index(lamps_m_.size() - 1)) = lamps_m_.back();
       problem_.lamps.push_back(
-          {lamps_m_.back(), input_.frees_map_shape ? kInfinite : lamp.sd_m.value_or(0)});
+          {lamps_m_.back(), input_.map_prior == MapPrior::frame ? kInfinite : lamp.sd_m.value_or(0),
+           input_.map_prior == MapPrior::heights});
     }
     all_.lamp_seen.resize(lamps_m_.size());
   }
@@ -260,7 +278,7 @@ class ProblemAssembler {
     sums_m_[pivot] += pose.position_m;
     sums_m_[pivot].head<2>() -= turn * lever_arm_m_;
     ++num_captures_[pivot];
-    problem_.has_lever_arm = true;
+    problem_.has_lever_arm = input_.estimates_lever_arm;
     return pivot;
   }
 
@@ -279,7 +297,8 @@ class ProblemAssembler {
     ++all_.known_positions[entry->second].captures;
     Eigen::Vector3d stated_m(place.xy_m.x(), place.xy_m.y(), place.z_m.value_or(0));
     stated_m -= all_.origin_m;
-    problem_.has_lever_arm |= place.measured_point == MeasuredPoint::axis;
+    if (place.measured_point == MeasuredPoint::axis)
+      problem_.has_lever_arm = input_.estimates_lever_arm;
     problem_.position_observations.push_back({capture_index, entry->second,
                                               place.measured_point == MeasuredPoint::axis, stated_m,
                                               place.z_m ? 3 : 2, place.sd_m});
@@ -302,8 +321,8 @@ class ProblemAssembler {
 
 AssembledProblem assemble_adjustment_problem(const AdjustmentInput& input) {
   ProblemAssembler assembler(input);
-  for (const AdjustmentCapture& capture : input.captures)
-    assembler.add_capture_or_count_as_rejected(capture);
+  for (std::size_t i = 0; i < input.captures.size(); ++i)
+    assembler.add_capture_or_count_as_rejected(i);
   return std::move(assembler).finish();
 }
 
@@ -388,7 +407,8 @@ double compute_normalized_survey_correction(const AdjustmentProblem& problem,
 class Contradictions {
  public:
   explicit Contradictions(AssembledProblem& all) : all_(all) {
-    for (const auto& lamp : all.problem.lamps) sd_m_.push_back(lamp.sd_m);
+    for (const auto& lamp : all.problem.lamps)
+      sd_m_.push_back(lamp.is_height_only ? kInfinite : lamp.sd_m);
     moved_.resize(sd_m_.size());
   }
 
@@ -402,10 +422,11 @@ class Contradictions {
   void reject_far_observations() {
     constexpr double max_sigmas = 8;  // standard deviations
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
-      const auto& [surveyed_m, sd_m] = all_.problem.lamps[i];
+      const Eigen::Vector3d& surveyed_m = all_.problem.lamps[i].surveyed_m;
       const Eigen::Vector3d found_m = all_.problem.state_vector().segment<3>(
           all_.problem.state_vector_layout().lamp_state_index(i));
-      if (all_.lamp_seen[i] && sd_m > 0 && (found_m - surveyed_m).norm() > max_sigmas * sd_m) {
+      if (all_.lamp_seen[i] && sd_m_[i] > 0 &&
+          (found_m - surveyed_m).norm() > max_sigmas * sd_m_[i]) {
         stop_using_surveyed_position(i);
       }
     }
@@ -596,26 +617,32 @@ double compute_mean_height_m(const AdjustmentProblem& problem) {
   return sum_m / std::max(1, count);
 }
 
-/// Sets the counts of captures and detections, and their residuals.
-void set_detection_residuals(const AdjustmentProblem& problem, bool noise_is_stated, double freedom,
+/// Sets the counts of captures and detections, and their residuals. `lamps` are those of the
+/// problem.
+void set_detection_residuals(const AssembledProblem& all, const LampMap& lamps, double freedom,
                              AdjustmentResult& result) {
+  const AdjustmentProblem& problem = all.problem;
   double squares_px = 0;
   std::vector<bool> capture_used(problem.captures.size());
   const std::vector<double> lengths = compute_residual_norms(problem);
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     const auto& sighting = problem.sightings[i];
+    const double distance_px = lengths[i] * sighting.sigma_px * problem.noise_scale;
+    result.residuals.push_back({all.capture_indices[sighting.capture],
+                                lamps.lamps[sighting.lamp].id, distance_px, sighting.used});
     if (!sighting.used) continue;
     ++result.detections;
     capture_used[sighting.capture] = true;
-    squares_px += std::pow(lengths[i] * sighting.sigma_px * problem.noise_scale, 2);
+    squares_px += distance_px * distance_px;
   }
   result.rejected_detections -= result.detections;
   result.captures = static_cast<int>(std::count(capture_used.begin(), capture_used.end(), true));
   result.rejected_captures += static_cast<int>(capture_used.size()) - result.captures;
+  result.degrees_of_freedom = freedom;
   result.residual_px = std::sqrt(squares_px / std::max(freedom, 1.0));
   result.noise_scale = problem.noise_scale;
   const double chance = 3 * std::sqrt(0.5 / std::max(freedom, 1.0));
-  result.noise_is_contradicted = noise_is_stated && problem.noise_scale > 1 + chance;
+  result.noise_is_contradicted = all.noise_is_stated && problem.noise_scale > 1 + chance;
 }
 
 /// Sets lens, zenith and lever arm with their covariances.
@@ -829,7 +856,7 @@ AdjustmentResult run_bundle_adjustment(const AdjustmentInput& all_lamps,
     return result;
   }
   const Eigen::MatrixXd& covariance = adjusted->matrix;
-  set_detection_residuals(problem, all.noise_is_stated, adjusted->degrees_of_freedom, result);
+  set_detection_residuals(all, input.lamps, adjusted->degrees_of_freedom, result);
   bool has_lever_arm = false;
   result.undetermined = explain_undetermined(problem, covariance, compute_mean_height_m(problem),
                                              limits, has_lever_arm);

@@ -49,6 +49,20 @@ struct KnownPosition {
   double sd_m;
 };
 
+/// Knowledge of the positions of the lamps.
+enum class MapPrior {
+  /// Each position with its sd_m.
+  survey,
+  /// Only translation, yaw and scale of the map, exactly, because captures do not determine them.
+  /// The corrections d of the detected lamps, at p relative to their mean, satisfy
+  ///   sum d = 0,   sum (p x d)_z = 0,   sum p . d = 0
+  /// AdjustmentResult::surveyed_covariance is then not defined.
+  frame,
+  /// Height of each lamp with its sd_m (exact without one), and horizontally only translation and
+  /// yaw, exactly, and scale. sum p . d then has the standard deviation that follows from sd_m.
+  heights
+};
+
 /// One capture with its detections and sensor data.
 struct AdjustmentCapture {
   /// Name of the capture for messages.
@@ -62,6 +76,8 @@ struct AdjustmentCapture {
   /// Motion of the camera; at a pivot only the yaw rate is used. Requires row time and readout
   /// direction of the camera.
   KnownMotion motion = {};
+  /// Initial pose of the camera; std::nullopt: the pose of a level camera.
+  std::optional<Pose> initial_pose = {};
 };
 
 /// Input of run_bundle_adjustment().
@@ -72,12 +88,10 @@ struct AdjustmentInput {
   /// Lens with IntrinsicsReport::covariance (exact if absent), and initial zenith (level if
   /// absent).
   Calibration calibration;
-  /// Estimates the shape of the map independently of its sd_m. Captures do not determine its
-  /// translation, yaw and scale, which stay fixed. The corrections d of the detected lamps, at p
-  /// relative to their mean, satisfy
-  ///   sum d = 0,   sum (p x d)_z = 0,   sum p . d = 0
-  /// AdjustmentResult::surveyed_covariance is then not defined.
-  bool frees_map_shape = false;
+  MapPrior map_prior = MapPrior::survey;
+  /// Estimates the lever arm if captures of a pivot or positions of the axis depend on it.
+  /// Otherwise it keeps its value in the calibration, or zero.
+  bool estimates_lever_arm = true;
   /// Set if the captures were checked separately and contain no gross outliers. Skips the robust
   /// start, which rejects all detections of a lamp whose exact position in the map is wrong.
   bool captures_are_checked = false;
@@ -154,9 +168,23 @@ struct AdjustmentResult {
   int captures = 0, rejected_captures = 0;
   /// Number of detections that are used, and that are rejected.
   int detections = 0, rejected_detections = 0;
+  /// Detection of a lamp of the map in a capture that has a pose.
+  struct DetectionResidual {
+    /// Index in AdjustmentInput::captures.
+    std::size_t capture;
+    int lamp;
+    /// Distance from the predicted position, in px; infinite if the lens cannot project the lamp.
+    double distance_px;
+    /// False if the detection is an outlier.
+    bool is_used;
+  };
+  std::vector<DetectionResidual> residuals;
   /// RMS residual of the used detections per axis, in px: sqrt(sum of squares / degrees of
   /// freedom).
   double residual_px = 0;
+  /// Degrees of freedom of the used detections: their coordinates minus the trace of the hat
+  /// matrix.
+  double degrees_of_freedom = 0;
   /// Factor by which sigma_px is multiplied because the residuals are larger; 1 if they are not. If
   /// no sigma_px is given, the estimated noise in px.
   double noise_scale = 1;

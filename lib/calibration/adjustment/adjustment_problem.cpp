@@ -183,7 +183,7 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize_lamp_observation(
   AdjustmentResidual at{weight * (sighting.pixel - seen->pixel), {{capture.local, by_local}}};
   if (capture.pivot) {
     at.blocks.push_back({layout_.pivot_state_index(*capture.pivot), -by_lamp});
-    at.blocks.push_back({layout_.lever_arm, -by_level.leftCols<2>()});
+    if (has_lever_arm) at.blocks.push_back({layout_.lever_arm, -by_level.leftCols<2>()});
   }
   at.blocks.push_back({layout_.zenith, by_camera * turn.jacobian_wrt_zenith});
   at.blocks.push_back({lamp, by_lamp});
@@ -217,7 +217,7 @@ AdjustmentResidual AdjustmentProblem::linearize_known_position(
   AdjustmentResidual at{position_m - place.measured_m, {{capture.local, by_local}}};
   if (capture.pivot)
     at.blocks.push_back({layout_.pivot_state_index(*capture.pivot), Eigen::Matrix3d::Identity()});
-  if (factor != 0) {
+  if (factor != 0 && has_lever_arm) {
     at.blocks.push_back(
         {layout_.lever_arm, factor * camera.level_from_world.transpose().leftCols<2>()});
   }
@@ -261,7 +261,17 @@ AdjustmentResidual AdjustmentProblem::linearize_gauge_constraint() const {
 
 bool AdjustmentProblem::is_lamp_position_exact(Eigen::Index first) const {
   return first >= layout_.lamps && first < layout_.pivots &&
-         lamps[static_cast<std::size_t>(first - layout_.lamps) / 3].sd_m == 0;
+         lamps[static_cast<std::size_t>(first - layout_.lamps) / 3].is_exact();
+}
+
+AdjustmentResidual AdjustmentProblem::linearize_lamp_prior(std::size_t lamp) const {
+  const auto& [surveyed_m, sd_m, is_height_only] = lamps[lamp];
+  const Eigen::Index at = layout_.lamp_state_index(lamp), size = is_height_only ? 1 : 3;
+  // Far below the resolution of detections, and far above rounding.
+  constexpr double min_sd_m = 1e-6;
+  const double weight = 1 / std::max(sd_m, min_sd_m);
+  return {weight * (state_.segment<3>(at) - surveyed_m).tail(size),
+          {{at, weight * Eigen::Matrix3d::Identity().bottomRows(size)}}};
 }
 
 std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_least_squares_terms(
@@ -284,14 +294,8 @@ std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_least_squares_terms
     }});
   }
   for (std::size_t i = 0; i < lamps.size(); ++i) {
-    if (lamps[i].sd_m == 0 || std::isinf(lamps[i].sd_m)) continue;
-    terms.push_back({[this, i] {
-                       const auto& [surveyed_m, sd_m] = lamps[i];
-                       return AdjustmentResidual{
-                           (state_.segment<3>(layout_.lamp_state_index(i)) - surveyed_m) / sd_m,
-                           {{layout_.lamp_state_index(i), Eigen::Matrix3d::Identity() / sd_m}}};
-                     },
-                     true});
+    if (lamps[i].is_exact() || std::isinf(lamps[i].sd_m)) continue;
+    terms.push_back({[this, i] { return linearize_lamp_prior(i); }, true});
   }
   if (gauge.cols() > 0) terms.push_back({[this] { return linearize_gauge_constraint(); }});
   for (const PositionObservation& place : position_observations) {
@@ -392,10 +396,10 @@ Eigen::MatrixXd AdjustmentProblem::make_weak_prior_information_matrix() const {
   information.segment<2>(layout_.lever_arm).setConstant(1 / (guess_m * guess_m));
   information.tail(layout_.global - layout_.pivots).setConstant(1 / (guess_m * guess_m));
   for (std::size_t i = 0; i < lamps.size(); ++i) {
-    if (std::isinf(lamps[i].sd_m)) {
+    if (lamps[i].is_height_only || std::isinf(lamps[i].sd_m)) {
       information.segment<3>(layout_.lamp_state_index(i)).setConstant(1 / (guess_m * guess_m));
     }
-    if (lamps[i].sd_m == 0) information.segment<3>(layout_.lamp_state_index(i)).setOnes();
+    if (lamps[i].is_exact()) information.segment<3>(layout_.lamp_state_index(i)).setOnes();
   }
   return information.asDiagonal();
 }

@@ -102,6 +102,10 @@ class AdjustmentProblem {
     Eigen::Vector3d surveyed_m;
     /// Standard deviation per axis. 0: the lamp is fixed; infinite: the survey is ignored.
     double sd_m;
+    /// True if only the height is known.
+    bool is_height_only = false;
+
+    bool is_exact() const { return sd_m == 0 && !is_height_only; }
   };
   /// Observation of a known position by one capture.
   struct PositionObservation {
@@ -133,7 +137,7 @@ class AdjustmentProblem {
   Eigen::MatrixXd gauge;
   std::vector<PositionObservation> position_observations;
   std::vector<bool> is_known_position_used;
-  /// True if some residual depends on the lever arm.
+  /// True if some residual depends on the lever arm, and the lever arm is estimated.
   bool has_lever_arm = false;
   /// Factor by which all sigma_px are multiplied.
   double noise_scale = 1;
@@ -185,6 +189,7 @@ class AdjustmentProblem {
   std::vector<Term> make_least_squares_terms(const std::optional<Lens>& lens) const;
   AdjustmentResidual linearize_known_position(const PositionObservation& place) const;
   AdjustmentResidual linearize_motion_prior(const Capture& capture) const;
+  AdjustmentResidual linearize_lamp_prior(std::size_t lamp) const;
   AdjustmentResidual linearize_gauge_constraint() const;
   /// Returns true if the block of the state is a lamp with an exact position.
   bool is_lamp_position_exact(Eigen::Index first) const;

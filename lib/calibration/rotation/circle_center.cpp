@@ -209,8 +209,8 @@ HeightCircles fit_circles(const RotationCaptures& rotation, std::size_t height, 
   return result;
 }
 
-/// Estimates the noise of a coordinate in units of the focal length. Uses the circles, or the joint
-/// fit if all circles have three points. Returns at least the given noise, and std::nullopt if
+/// Estimates the noise of a coordinate in units of the focal length. Uses the circles, or the
+/// axis if all circles have three points. Returns at least the given noise, and std::nullopt if
 /// neither residuals nor detections determine it.
 std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
                                      const RotationCaptures& rotation, const Camera& camera) {
@@ -223,9 +223,8 @@ std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
   std::optional<double> noise;
   if (freedom > 0) {
     noise = std::sqrt(squares / freedom);
-  } else if (const RotationFit joint = fit_rotation_center_to_all_lamps(rotation, camera);
-             joint.converged) {
-    noise = joint.residual_px / focal_px;
+  } else if (const RotationFit axis = fit_rotation_axis(rotation, camera); axis.converged) {
+    noise = axis.residual_px / focal_px;
   }
   if (rotation.median_sigma_px)
     noise = std::max(noise.value_or(0), *rotation.median_sigma_px / focal_px);
@@ -286,7 +285,6 @@ CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotati
   result.mean.center =
       make_rotation_center_from_axis_point(mean, RotationModel::shift, camera, measured);
   result.mean.residual_px = freedom > 0 ? focal_px * std::sqrt(squares / freedom) : 0;
-  result.mean.yaws_rad = collect_capture_yaws_rad(rotation);
   return result;
 }
 

@@ -311,11 +311,10 @@ void add_observations_of_capture(RotationCaptures& rotation, const Frame& frame,
     const auto ray = lens.unproject_pixel(detection.pixel);
     if (lamp == nullptr || !ray) continue;
     const Eigen::Vector3d unit = ray->direction.normalized();
-    const auto projection = lens.project_point_with_jacobians(unit);
-    if (!projection) continue;
-    rotation.observations.push_back(
-        {capture, static_cast<std::size_t>(lamp - rotation.lamps.data()), detection.pixel,
-         detection.sigma_px.value_or(1), unit, projection->d_pixel_d_point});
+    if (!lens.project_point(unit)) continue;
+    rotation.observations.push_back({capture,
+                                     static_cast<std::size_t>(lamp - rotation.lamps.data()),
+                                     detection.pixel, detection.sigma_px, unit});
   }
 }
 

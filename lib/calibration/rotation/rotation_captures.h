@@ -23,11 +23,9 @@ struct RotationObservation {
   /// Index in RotationCaptures::lamps of the observed lamp.
   std::size_t lamp;
   Eigen::Vector2d pixel;
-  double sigma_px;
+  std::optional<double> sigma_px;
   /// Direction of the pixel's ray in the camera, of unit length.
   Eigen::Vector3d ray;
-  /// Derivative of the pixel with respect to the ray direction. It maps the ray itself to zero.
-  Eigen::Matrix<double, 2, 3> d_pixel_d_ray;
 };
 
 /// Capture of a rotation in place.

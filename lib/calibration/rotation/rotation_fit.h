@@ -24,12 +24,10 @@ struct RotationOutlier {
 struct RotationFit {
   /// True if the fit succeeded; otherwise the other members are not valid.
   bool converged = false;
-  /// Rotation center with its covariances. They are scaled by the residuals of the fit; sigma_px of
-  /// the detections only sets relative weights. They include the map's sd_m if the method depends
-  /// on the map. There is no covariance if the fit has no redundancy.
+  /// Rotation center with its covariances, which include the map's sd_m if the method depends on
+  /// the map. `circle`: the covariance follows from the residuals; there is none without
+  /// redundancy.
   RotationCenter center = {};
-  /// Yaw of each capture, rad, in the order of RotationCaptures::captures.
-  std::vector<double> yaws_rad = {};
   /// RMS residual of the inliers per image axis, in px: sqrt(sum of squares / (measurements -
   /// unknowns)). It estimates the pixel noise. It is 0 if there are as many measurements as
   /// unknowns.
@@ -62,27 +60,6 @@ RotationCenter make_rotation_center_from_axis_point(const Eigen::Vector2d& z, Ro
                                                     const Camera& camera,
                                                     const std::optional<Matrix2>& covariance);
 
-/// Returns the yaws of the captures, rad, in the order of RotationCaptures::captures.
-std::vector<double> collect_capture_yaws_rad(const RotationCaptures& rotation);
-
-/// Fits one rotation center for all lamps in the undistorted image (lib/THEORY.md, "Rotation
-/// center", method `joint`). The model is that of eq. 9 with one angle per capture that all lamps
-/// share.
-///
-/// Minimizes the distances of the lamps in the image, in standard deviations, with a Cauchy loss
-/// and rejection of outliers (robust_fit.h), from
-///   z_ik = c + e^{-jg_k} q_ih
-/// over
-///   c     center
-///   g_k   yaw of capture k
-///   q_ih  position of lamp i about the center, at height h and yaw 0
-///
-/// Exact for a level camera and captures at one height. If the camera is tilted, c is biased
-/// outwards as in fit_and_average_lamp_circle_centers(). The model of the result is
-/// RotationModel::shift.
-RotationFit fit_rotation_center_to_all_lamps(const RotationCaptures& rotation,
-                                             const Camera& camera);
-
 /// Largest standard deviation of a lever arm that lamps at several heights determine, as a fraction
 /// of the lamps' height above the camera. It corresponds to 0.3 degrees of tilt.
 inline constexpr double kMaxLeverArmSdFraction = 0.005;
@@ -94,17 +71,17 @@ inline constexpr double kMaxLeverArmSdFraction = 0.005;
 ///     undistorted image. Not converged if the RMS residual exceeds 0.007 focal lengths and four
 ///     times RotationCaptures::median_sigma_px: the captures are then no rotation about one axis.
 ///
-/// Minimizes the squared distances of the lamps, in the image, from
+/// A preset of run_bundle_adjustment() with an exact lens and MapPrior::heights: minimizes the
+/// squared distances of the lamps, in the image, from
 ///   project(camera_from_level(zenith) (Rz(-g_k) (p_i - A_h) - e, Z_i - z_h))
 /// over
 ///   zenith    up direction in the camera
 ///   g_k       yaw of capture k
-///   p_i       horizontal position of lamp i
+///   p_i, Z_i  horizontal position and height of lamp i
 ///   e         lever arm
-///   A_h, z_h  position of the axis and height of the camera, for captures at several heights
-/// The heights Z_i are those of the map. The map supplies only initial values of p_i, so that its
-/// horizontal errors have no effect. The scale is that of the map: the size of the lamp pattern is
-/// kept. The covariance includes errors of heights and scale by the map's sd_m.
+///   A_h, z_h  position of the axis and height of the camera at height h
+/// Horizontal errors of the map have no effect, except for one of its scale. Heights and scale have
+/// the errors that follow from sd_m. The noise of the detections is at least the stated one.
 ///
 /// A lever arm and a tilt both displace the image, by zeta - e/H, where H is the height of a lamp
 /// above the camera. Captures at several heights separate them. Lamps whose heights differ by

@@ -196,7 +196,8 @@ AdjustmentResult adjust_until_detections_agree(const std::vector<AdjustmentCaptu
   AdjustmentResult found;
   for (int iteration = 0, detections = 0; iteration < max_iterations; ++iteration) {
     Placement placement = locate_captures_separately(captures, input.lamps, input.calibration);
-    result.undetermined = explain_undetermined(placement, input.lamps, input.frees_map_shape);
+    result.undetermined =
+        explain_undetermined(placement, input.lamps, input.map_prior == MapPrior::frame);
     if (!result.undetermined.empty() || placement.count_detections() == detections) break;
     detections = placement.count_detections();
     if (iteration == 0) {
@@ -223,7 +224,7 @@ TiltCalibration estimate_camera_tilt_from_lamps(std::span<const Frame> frames, c
   const auto captures = select_captures(frames, map, options.motions, result);
   AdjustmentInput input{{}, map, {}};
   input.calibration.camera = camera;
-  input.frees_map_shape = options.refine_map;
+  if (options.refine_map) input.map_prior = MapPrior::frame;
   input.captures_are_checked = true;
   input.weighs_in_undistorted_image = true;
   const AdjustmentResult found = adjust_until_detections_agree(captures, input, result);

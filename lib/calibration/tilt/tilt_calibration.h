@@ -17,7 +17,7 @@ namespace vlp {
 
 /// Options of estimate_camera_tilt_from_lamps().
 struct TiltCalibrationOptions {
-  /// If true, also estimates corrections of the lamp map (AdjustmentInput::frees_map_shape).
+  /// If true, also estimates corrections of the lamp map (MapPrior::frame).
   /// Captures at different yaws separate a tilt of all lamps from that of the camera. Captures at
   /// different positions determine the distances of the lamps. Lamps that are not detected keep
   /// their positions.

@@ -139,7 +139,7 @@ void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& 
   for (std::size_t i = 0; i < rotation.captures.size(); ++i) {
     const RotationCapture& capture = rotation.captures[i];
     fmt::print("{:>10} {:10.3f}  {}\n", format_height_m(rotation.heights[capture.height].z_m),
-               deg_from_rad(wrap_angle_rad(fit.yaws_rad[i])),
+               deg_from_rad(wrap_angle_rad(rotation.captures[i].yaw_rad)),
                escape_text_for_single_line(capture.image));
   }
 }

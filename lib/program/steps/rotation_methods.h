@@ -25,7 +25,7 @@ void run_tilt_calibration_program(const CLI::App& app, CaptureOptions images,
                                   const TiltOptions& options);
 
 /// Estimates the rotation center from captures of a rotation in place (calibration/rotation/), for
-/// vlp-rotation --method axis|joint|circle. `plot` is the file of the plot; empty: none.
+/// vlp-rotation --method axis|circle. `plot` is the file of the plot; empty: none.
 void run_rotation_center_program(const CLI::App& app, CaptureOptions images,
                                  const std::string& method, const std::string& plot);
 

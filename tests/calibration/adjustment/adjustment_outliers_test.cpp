@@ -425,7 +425,7 @@ TEST_F(RunBundleAdjustmentOutliers, MotionHasNoEffectWithoutRowTime) {
 TEST_F(RunBundleAdjustmentOutliers, CorrectionsOfFreeMapContainNoSimilarity) {
   make_problem(0.05, 0.03);
   for (AdjustmentCapture& capture : input.captures) capture.known_position.reset();
-  input.frees_map_shape = true;
+  input.map_prior = MapPrior::frame;
   const AdjustmentResult found = run_bundle_adjustment(input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   ASSERT_EQ(found.lamps.size(), 5U);

@@ -223,6 +223,7 @@ TEST_F(RunBundleAdjustmentResult, LensChiSquaredComparesCorrectionWithItsCovaria
     problem.lamps = truth.lamps;
     problem.position_observations = truth.position_observations;
     problem.is_known_position_used = truth.is_known_position_used;
+    problem.has_lever_arm = true;
     problem.state_vector() = truth.state_vector();
     const auto covariance = solve_with_noise(problem, 1);
     const Eigen::Vector3d u = problem.state_vector().head<3>();

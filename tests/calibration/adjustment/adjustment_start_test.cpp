@@ -174,7 +174,7 @@ TEST(RunBundleAdjustmentStart, FreeMapHasFiveFixedDirections) {
   survey.turn({0, 0, 0}, 6);
   survey.turn({0.3, 0.1, 0.2}, 6);
   survey.stand({{-0.3, 0.2, 0.1}, 1});
-  survey.input.frees_map_shape = true;
+  survey.input.map_prior = MapPrior::frame;
   survey.input.lamps.lamps[2].position_m += Eigen::Vector3d(0.02, -0.01, 0.03);
   const AdjustmentResult found = run_bundle_adjustment(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;

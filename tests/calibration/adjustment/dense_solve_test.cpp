@@ -268,6 +268,7 @@ class AdjustmentDerivatives : public testing::Test {
 
   AdjustmentDerivatives() {
     const AdjustmentLayout& at = problem.state_vector_layout();
+    problem.has_lever_arm = true;
     problem.lamps = {{{0.4, 0.3, 1.6}, 0.001}, {{-0.5, 0.2, 1.5}, 0.001}};
     KnownMotion motion;
     motion.yaw_rate_rad_per_s = 1.5;

@@ -214,36 +214,5 @@ TEST(FitAndAverageLampCircleCenters, ConvergesWhenThirdYawJoinsOppositeYaws) {
   }
 }
 
-TEST(FitRotationCenterToAllLamps, ReturnsAxisPixelWhenCameraIsLevel) {
-  RotationScene scene;
-  scene.lever_arm_m = {0.05, -0.02};
-  const RotationFit found = fit_rotation_center_to_all_lamps(find_captures(scene), scene.camera);
-  ASSERT_TRUE(found.converged);
-  EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
-  EXPECT_LT(found.residual_px, 1e-7);
-  EXPECT_EQ(found.center.model, RotationModel::shift);
-}
-
-TEST(FitRotationCenterToAllLamps, ReturnsAxisPixelForTwoHeightsWithoutLeverArm) {
-  RotationScene scene;
-  scene.heights_m = {0, 0.3};
-  const RotationFit found = fit_rotation_center_to_all_lamps(find_captures(scene), scene.camera);
-  ASSERT_TRUE(found.converged);
-  EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
-}
-
-TEST(FitRotationCenterToAllLamps, RejectsOneDisplacedDetectionAsOutlier) {
-  const RotationScene scene;
-  std::vector<Frame> frames = scene.frames();
-  frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);
-  const RotationCaptures rotation =
-      find_in_place_rotation_captures(frames, scene.map, scene.camera);
-  ASSERT_EQ(rotation.status, RotationStatus::ok);
-  const RotationFit found = fit_rotation_center_to_all_lamps(rotation, scene.camera);
-  EXPECT_THAT(found.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
-  ASSERT_EQ(found.outliers.size(), 1U);
-  EXPECT_NEAR(found.outliers[0].distance_px, 15, 0.3);
-}
-
 }  // namespace
 }  // namespace vlp

@@ -80,8 +80,7 @@ TEST(RotationFit, ResidualOfEachMethodMatchesPixelNoisePerAxis) {
   scene.captures = 5;           // few, so that degrees of freedom count
   scene.only_in_image = false;  // or some circle has three points
   scene.arc_rad = 5;
-  for (const Method method :
-       {&mean_circle, &fit_rotation_center_to_all_lamps, &fit_rotation_axis}) {
+  for (const Method method : {&mean_circle, &fit_rotation_axis}) {
     Random random(9);
     const auto frames = scene.frames(kNoise_px);
     double squares = 0;
@@ -102,20 +101,28 @@ struct TurnUnderMap {
   std::vector<double> heights_m;
   /// Height of every second lamp above the remaining lamps.
   double step_m;
+  /// Number of captures at each height.
+  int captures = 12;
+  std::size_t lamps = 8;
+  /// Stated noise of the detections.
+  double noise_px = 0.03;
 };
 
 class FitRotationAxisWithMapErrors : public testing::TestWithParam<TurnUnderMap> {};
 
-/// 300 maps of two axes determine a standard deviation to 4 %.
+/// 300 maps of two axes determine a standard deviation to 3 %, that of the lever arm to 5 %,
+/// because the error of the scale is common to both axes.
 TEST_P(FitRotationAxisWithMapErrors, ZenithAndLeverArmErrorsMatchReportedCovariances) {
   constexpr int maps = 300;
   const TurnUnderMap& turn = GetParam();
   RotationScene scene = tilted_scene(turn.lever_arm_m, turn.heights_m);
   scene.only_in_image = false;
+  scene.captures = turn.captures;
+  scene.map.lamps.resize(turn.lamps);
   for (std::size_t i = 0; i < scene.map.lamps.size(); i += 2) {
     scene.map.lamps[i].position_m.z() += turn.step_m;
   }
-  const auto frames = scene.frames(0.03);
+  const auto frames = scene.frames(turn.noise_px);
   Random random(14);
   double zenith_squares = 0, arm_squares = 0, arm_variance_m2 = 0;
   for (int i = 0; i < maps; ++i) {
@@ -140,7 +147,7 @@ TEST_P(FitRotationAxisWithMapErrors, ZenithAndLeverArmErrorsMatchReportedCovaria
   }
   std::printf("%s: zenith e/sd %.2f, lever arm e/sd %.2f, sd %.3f mm\n", turn.name,
               std::sqrt(zenith_squares), std::sqrt(arm_squares), 1e3 * std::sqrt(arm_variance_m2));
-  EXPECT_NEAR(std::sqrt(zenith_squares), 1, 0.15);
+  EXPECT_NEAR(std::sqrt(zenith_squares), 1, 0.1);
   EXPECT_NEAR(std::sqrt(arm_squares), 1, 0.15);
 }
 
@@ -150,7 +157,12 @@ INSTANTIATE_TEST_SUITE_P(
                     TurnUnderMap{"LongArm", 2e-3, {0.25, -0.2}, {0, 0.3}, 0},
                     TurnUnderMap{"ShortArm", 2e-3, {0.016, -0.012}, {0, 0.3}, 0},
                     TurnUnderMap{"LampsAtTwoHeights", 2e-3, {0.25, -0.2}, {0, 0.3}, 0.3},
-                    TurnUnderMap{"OneHeight", 1e-3, {0.25, -0.2}, {0}, 0.5}),
+                    TurnUnderMap{"OneHeight", 1e-3, {0.25, -0.2}, {0}, 0.5},
+                    TurnUnderMap{"FourLampsArm50mm", 2e-3, {0.03, -0.04}, {0, 0.3}, 0, 6, 4, 0.05},
+                    TurnUnderMap{"FourLampsArm200mm", 2e-3, {0.12, -0.16}, {0, 0.3}, 0, 6, 4, 0.05},
+                    TurnUnderMap{
+                        "FourLampsArm320mm", 2e-3, {0.192, -0.256}, {0, 0.3}, 0, 6, 4, 0.05},
+                    TurnUnderMap{"FourLampsArm500mm", 2e-3, {0.3, -0.4}, {0, 0.3}, 0, 6, 4, 0.05}),
     [](const auto& turn) { return turn.param.name; });
 
 struct SmallTurn {
@@ -160,42 +172,38 @@ struct SmallTurn {
 /// Few captures without given noise: the median of few residuals scatters. 400 runs determine the
 /// mean of e' C^-1 e to 5 %. With nu degrees of freedom C scatters, and the mean is 2 nu / (nu -
 /// 2).
-class RotationFitWithFewCaptures : public testing::TestWithParam<SmallTurn> {};
+class FitRotationAxisWithFewCaptures : public testing::TestWithParam<SmallTurn> {};
 
-TEST_P(RotationFitWithFewCaptures, CenterErrorsMatchCovarianceAndInliersAreKept) {
+TEST_P(FitRotationAxisWithFewCaptures, CenterErrorsMatchCovarianceAndInliersAreKept) {
   constexpr int runs = 400;
-  for (const Method method : {&fit_rotation_center_to_all_lamps, &fit_rotation_axis}) {
-    RotationScene scene =
-        method == &fit_rotation_center_to_all_lamps ? level_scene() : tilted_scene({0, 0});
-    scene.map.lamps.resize(static_cast<std::size_t>(GetParam().lamps));
-    scene.captures = GetParam().captures;
-    scene.only_in_image = false;
-    const auto frames = scene.frames(kNoise_px);
-    const RotationCaptures exact = find_in_place_rotation_captures(frames, scene.map, scene.camera);
-    ASSERT_EQ(exact.status, RotationStatus::ok);
-    const Eigen::Vector2d truth = method(exact, scene.camera).center.center_px;
-    const double unknowns = 2 + 2 * GetParam().lamps + GetParam().captures - 1;
-    const double freedom = 2 * GetParam().lamps * GetParam().captures - unknowns;
-    Random random(12);
-    double distance = 0;
-    int with_outliers = 0;
-    for (int i = 0; i < runs; ++i) {
-      const RotationFit fit = draw_fit(scene, frames, method, random, false);
-      ASSERT_TRUE(fit.center.covariance);
-      const Eigen::Vector2d error = fit.center.center_px - truth;
-      distance += error.dot(fit.center.covariance->inverse() * error) / runs;
-      with_outliers += fit.outliers.empty() ? 0 : 1;
-    }
-    std::printf(
-        "%d captures, %d lamps: %d of %d runs with outliers, e' C^-1 e %.2f, expected %.2f\n",
-        GetParam().captures, GetParam().lamps, with_outliers, runs, distance,
-        2 * freedom / (freedom - 2));
-    EXPECT_LE(with_outliers, runs / 100);
-    EXPECT_NEAR(distance / (2 * freedom / (freedom - 2)), 1, 0.25);
+  RotationScene scene = tilted_scene({0, 0});
+  scene.map.lamps.resize(static_cast<std::size_t>(GetParam().lamps));
+  scene.captures = GetParam().captures;
+  scene.only_in_image = false;
+  const auto frames = scene.frames(kNoise_px);
+  const RotationCaptures exact = find_in_place_rotation_captures(frames, scene.map, scene.camera);
+  ASSERT_EQ(exact.status, RotationStatus::ok);
+  const Eigen::Vector2d truth = fit_rotation_axis(exact, scene.camera).center.center_px;
+  const double unknowns = 2 + 2 * GetParam().lamps + GetParam().captures - 1;
+  const double freedom = 2 * GetParam().lamps * GetParam().captures - unknowns;
+  Random random(12);
+  double distance = 0;
+  int with_outliers = 0;
+  for (int i = 0; i < runs; ++i) {
+    const RotationFit fit = draw_fit(scene, frames, fit_rotation_axis, random, false);
+    ASSERT_TRUE(fit.center.covariance);
+    const Eigen::Vector2d error = fit.center.center_px - truth;
+    distance += error.dot(fit.center.covariance->inverse() * error) / runs;
+    with_outliers += fit.outliers.empty() ? 0 : 1;
   }
+  std::printf("%d captures, %d lamps: %d of %d runs with outliers, e' C^-1 e %.2f, expected %.2f\n",
+              GetParam().captures, GetParam().lamps, with_outliers, runs, distance,
+              2 * freedom / (freedom - 2));
+  EXPECT_LE(with_outliers, runs / 100);
+  EXPECT_NEAR(distance / (2 * freedom / (freedom - 2)), 1, 0.25);
 }
 
-INSTANTIATE_TEST_SUITE_P(RotationScatter, RotationFitWithFewCaptures,
+INSTANTIATE_TEST_SUITE_P(RotationScatter, FitRotationAxisWithFewCaptures,
                          testing::Values(SmallTurn{3, 5}, SmallTurn{4, 5}, SmallTurn{3, 8},
                                          SmallTurn{6, 5}),
                          [](const auto& turn) {
@@ -227,9 +235,7 @@ TEST(RotationFit, EachMethodRejectsOnlyTheOutlierAmongFewCaptures) {
     Method method;
     int captures;
   };
-  for (const auto& [method, captures] :
-       {Case{mean_circle, 12}, Case{fit_rotation_center_to_all_lamps, 4},
-        Case{fit_rotation_axis, 4}}) {
+  for (const auto& [method, captures] : {Case{mean_circle, 12}, Case{fit_rotation_axis, 4}}) {
     RotationScene scene = method == &fit_rotation_axis ? tilted_scene({0, 0}) : level_scene();
     scene.map.lamps.resize(5);
     scene.captures = captures;
@@ -260,10 +266,6 @@ TEST(RotationFit, EachMethodRejectsOnlyTheOutlierAmongFewCaptures) {
 
 TEST(FitAndAverageLampCircleCenters, MeanCenterCovarianceMatchesScatterForLevelCamera) {
   expect_consistent(level_scene(), mean_circle, false);
-}
-
-TEST(FitRotationCenterToAllLamps, CenterCovarianceMatchesScatterForLevelCamera) {
-  expect_consistent(level_scene(), fit_rotation_center_to_all_lamps, true);
 }
 
 TEST(FitRotationAxis, CenterCovarianceMatchesScatterWithoutLeverArm) {

@@ -346,7 +346,7 @@ TEST(FindInPlaceRotationCaptures, FindsRotationOfCameraTiltedBy27Degrees) {
   EXPECT_THAT(rotation.zenith_in_camera, IsNear(scene.truth().zenith_in_camera, 1e-8));
 }
 
-TEST(FindInPlaceRotationCaptures, ObservationsHaveRayAndDerivativeOfEachKnownLamp) {
+TEST(FindInPlaceRotationCaptures, ObservationsHaveRayOfEachKnownLamp) {
   RotationScene scene = tilted_scene({0, 0});
   RotationFrames frames(scene);
   frames.add_turn(5, 0);
@@ -364,7 +364,7 @@ TEST(FindInPlaceRotationCaptures, ObservationsHaveRayAndDerivativeOfEachKnownLam
   EXPECT_FALSE(rotation.median_sigma_px);
   ASSERT_EQ(rotation.observations.size(), 35U);
   EXPECT_EQ(rotation.observations[14 + 3].sigma_px, 0.25);
-  EXPECT_EQ(rotation.observations[14 + 4].sigma_px, 1);
+  EXPECT_FALSE(rotation.observations[14 + 4].sigma_px);
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
   for (std::size_t i = 0; i < 35; ++i) {
     const RotationObservation& observation = rotation.observations[i];
@@ -376,15 +376,6 @@ TEST(FindInPlaceRotationCaptures, ObservationsHaveRayAndDerivativeOfEachKnownLam
     const auto pixel = lens.project_point(observation.ray);
     ASSERT_TRUE(pixel);
     EXPECT_THAT(*pixel, IsNear(observation.pixel, 1e-6));
-    Eigen::Matrix<double, 2, 3> derivative;
-    for (Eigen::Index axis = 0; axis < 3; ++axis) {
-      const Eigen::Vector3d step = 1e-5 * Eigen::Vector3d::Unit(axis);
-      const auto plus = lens.project_point(observation.ray + step),
-                 minus = lens.project_point(observation.ray - step);
-      ASSERT_TRUE(plus && minus);
-      derivative.col(axis) = (*plus - *minus) / 2e-5;
-    }
-    EXPECT_THAT(observation.d_pixel_d_ray, IsNear(derivative, 1e-3));
   }
 }
 
