@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "calibration/map/map_errors.h"
-#include "evaluation/floor_limits.h"
+#include "evaluation/errors/floor_limits.h"
 #include "evaluation/limits_table.h"
 #include "geometry/angles.h"
 #include "program/app.h"

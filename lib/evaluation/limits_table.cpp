@@ -7,7 +7,7 @@
 
 #include "captures/csv_writer.h"
 #include "captures/number_text.h"
-#include "evaluation/floor_limits.h"
+#include "evaluation/errors/floor_limits.h"
 
 namespace vlp {
 

@@ -4,7 +4,7 @@
 
 #include <filesystem>
 
-#include "evaluation/floor_limits.h"
+#include "evaluation/errors/floor_limits.h"
 
 namespace vlp {
 

@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "evaluation/floor_limits.h"
-#include "evaluation/unit_errors.h"
+#include "evaluation/errors/floor_limits.h"
+#include "evaluation/errors/unit_errors.h"
 #include "report/plots/evaluation_plots.h"
 #include "report/plots/plot_parts.h"
 

@@ -719,10 +719,17 @@ class SessionRun {
 }  // namespace
 
 std::vector<Gate> make_default_step_gates(const std::vector<Metric>& metrics) {
+  constexpr double max_reference_error_mm = 5;
+  const auto exceeds_reference_error = [&](const char* error) {
+    return find_metric_value(metrics, error).value_or(max_reference_error_mm) >=
+           max_reference_error_mm;
+  };
   std::vector<Gate> gates{{"row_time_error_percent", 100 * kLampDrift},
-                          {"dispersion_offset_px", 3},
-                          {"normalized_error_rms", 5},
-                          {"normalized_height_error_rms", 10}};
+                          {"dispersion_offset_px", 3}};
+  if (exceeds_reference_error("rms_mm")) gates.push_back({"normalized_error_rms", 5});
+  if (exceeds_reference_error("height_rms_mm")) {
+    gates.push_back({"normalized_height_error_rms", 10});
+  }
   std::erase_if(gates, [&](const Gate& gate) { return !find_metric_value(metrics, gate.metric); });
   return gates;
 }

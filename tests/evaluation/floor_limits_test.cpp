@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluation/floor_limits.h"
+#include "evaluation/errors/floor_limits.h"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 /// Compares the budget of a camera with the covariance of its fixes, with fixes of drawn errors,
 /// and part by part.
-#include "evaluation/unit_errors.h"
+#include "evaluation/errors/unit_errors.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include "evaluation/floor_limits.h"
+#include "evaluation/errors/floor_limits.h"
 #include "geometry/symmetric.h"
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"

@@ -44,8 +44,8 @@ std::vector<std::string> list_gates(const std::vector<CheckedMetric>& gates) {
 TEST_F(RunCalibrationSession, ChecksDefaultGatesOfEachStepForGivenCamera) {
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
-  EXPECT_EQ(std::ranges::count_if(result.gates, is_usual), 4);
-  EXPECT_EQ(result.gates.size(), 4U);
+  EXPECT_EQ(std::ranges::count_if(result.gates, is_usual), 2);
+  EXPECT_EQ(result.gates.size(), 2U);
   write_session_file("gates.yaml", format_gates("normalized_error_rms: 0.001"));
   EXPECT_THAT(list_gates(run().gates), ElementsAre("!normalized_error_rms"));
 }

@@ -9,7 +9,7 @@
 #include "captures/csv_writer.h"
 #include "captures/detections_table.h"
 #include "captures/number_text.h"
-#include "evaluation/floor_limits.h"
+#include "evaluation/errors/floor_limits.h"
 #include "geometry/angles.h"
 #include "support/synthetic_rig.h"
 

@@ -6,7 +6,7 @@
 
 #include "camera/lens.h"
 #include "captures/parallel_for.h"
-#include "evaluation/floor_limits.h"
+#include "evaluation/errors/floor_limits.h"
 #include "positioning/error_budget.h"
 
 namespace vlp {

@@ -4,9 +4,9 @@
 
 #include <vector>
 
+#include "evaluation/errors/floor_limits.h"
 #include "evaluation/evaluation.h"
 #include "evaluation/fix_summary.h"
-#include "evaluation/floor_limits.h"
 #include "evaluation/gate.h"
 
 namespace vlp {

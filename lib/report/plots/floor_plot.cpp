@@ -3,7 +3,7 @@
 #include "report/plots/floor_plot.h"
 
 #include "captures/number_text.h"
-#include "evaluation/floor_limits.h"
+#include "evaluation/errors/floor_limits.h"
 #include "report/plots/gnuplot.h"
 #include "report/plots/plot_parts.h"
 

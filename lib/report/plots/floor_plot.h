@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "evaluation/floor_limits.h"
+#include "evaluation/errors/floor_limits.h"
 #include "rig/lamp_map.h"
 
 namespace vlp {

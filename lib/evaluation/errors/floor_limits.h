@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "evaluation/unit_errors.h"
+#include "evaluation/errors/unit_errors.h"
 #include "geometry/frames.h"
 #include "positioning/error_budget.h"
 #include "rig/calibration.h"

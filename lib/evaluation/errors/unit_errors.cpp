@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-#include "evaluation/unit_errors.h"
+#include "evaluation/errors/unit_errors.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
