@@ -266,7 +266,11 @@ int32_t vlp_locate_image(const vlp_positioner* positioner, const vlp_image* imag
         copy_fix_to_c_struct(found.fix, *fix);
         return std::move(found.detections);
       });
-  if (code != VLP_OK) fix->status = code;
+  if (code != VLP_OK) {
+    *fix = {};
+    if (sensors != nullptr) fix->stamp = sensors->stamp;
+    fix->status = code;
+  }
   return fix->status;
 }
 

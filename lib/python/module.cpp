@@ -301,6 +301,10 @@ py::tuple project_lamp(const Positioner& positioner, int lamp, const StateVector
 
 py::dict compute_residuals(const Positioner& positioner, const py::object& lamps,
                            const Doubles& pixels, const Fix& fix) {
+  if (!fix.has_succeeded()) {
+    throw std::invalid_argument("the fix has no state: " +
+                                std::string(fix_status_name(fix.status)));
+  }
   const auto detections = make_detections(to_integers(lamps, "lamps"), pixels, std::nullopt);
   const auto n = std::ssize(detections);
   constexpr std::array uses{"used", "rejected", "not_in_map"};

@@ -12,7 +12,7 @@ fixes=$1/check-fixes.csv
 [ -f "$fixes" ] || refuse "$fixes: is missing; run vlp-calibrate on a session with check/"
 grep -q '"verdict": "pass"' "$1/session.json" || refuse "$1/session.json: the session did not pass; correct it first"
 cp -- "$fixes" "$2"
-awk '/"name": "mtf50"/ { getline; printf "format: vlp-gates/1\ngates: {mtf50: %.4f}\n", 0.85 * $2 }' \
+awk '/"name": "mtf50"/ { getline; printf "format: vlp-gates/1\ngates: {mtf50: %.4f}\n", 0.85 * $2; exit }' \
   "$1/session.json" >"$2.gates.yaml"
 printf 'commit %s\ndate %s\nversion %s\nsha256 %s\n' "$(git rev-parse HEAD 2>/dev/null || echo none)" \
   "$(date -u +%Y-%m-%dT%H:%M:%SZ)" "$(sed -n 's/.*"version": "\([^"]*\)".*/\1/p' "$1/session.json" | head -n 1)" \

@@ -24,9 +24,8 @@ struct LampCircle {
 
 /// Result of fit_and_average_lamp_circle_centers().
 struct CircleCenters {
-  /// Mean of the circle centers. `yaws_rad` are the yaws of the captures' position fixes.
-  /// `residual_px` is the RMS distance of the points from their circles, with three unknowns per
-  /// circle.
+  /// Mean of the circle centers. `residual_px` is the RMS distance of the points from their
+  /// circles, with three unknowns per circle.
   RotationFit mean;
   std::vector<LampCircle> circles;
   /// Number of (lamp, height) pairs with three observations or more that determine no circle.
