@@ -53,10 +53,9 @@ Calibration turn_over(Calibration calibration) {
   return calibration;
 }
 
-BodyState turn_over(BodyState state) {
-  auto& [pose, motion] = state;
-  pose = {turn_over(pose.position_m), -pose.yaw_rad};
-  return {pose,
+BodyState turn_over(const BodyState& state) {
+  const auto& [pose, motion] = state;
+  return {{turn_over(pose.position_m), -pose.yaw_rad},
           {turn_over(motion.velocity_m_per_s), -motion.yaw_rate_rad_per_s,
            turn_over(motion.inclination)}};
 }

@@ -18,7 +18,7 @@ LampMap turn_over(LampMap map);
 /// Rotates positions and errors of the lamps; the rest refers to the camera.
 Calibration turn_over(Calibration calibration);
 Sensors turn_over(Sensors sensors);
-BodyState turn_over(BodyState state);
+BodyState turn_over(const BodyState& state);
 /// Rotates states and covariances of a fix.
 Fix turn_over(Fix fix);
 LampProjection turn_over(LampProjection projection);
