@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 #include "frontend/observation.h"
-#include "lamps/light_detector.h"
 
 #include <fmt/core.h>
 
@@ -13,6 +12,7 @@
 #include <mutex>
 #include <utility>
 
+#include "lamps/light_detector.h"
 #include "rig/input_error.h"
 
 namespace vlp {

@@ -176,7 +176,8 @@ struct Explanation {
   BodyState state;
   double chi_squared = std::numeric_limits<double>::infinity();
 };
-using Explanations = std::array<Explanation, 6>;
+/// Fixes from each initial state, and then the initial states themselves.
+using Explanations = std::array<Explanation, 2 * kMaxInitialStates>;
 
 /// Sets the states that are nearly as likely as the best one as candidates. `scale` is the ratio of
 /// chi-squared to its expectation.
@@ -186,7 +187,7 @@ void set_candidates(Explanations& found, double scale, BodySolution& solution) {
   double sum = 0;
   for (const auto& [state, chi_squared] : found) {
     const double excess = (chi_squared - found.front().chi_squared) / scale;
-    if (!(excess < unlikely)) break;
+    if (!(excess < unlikely) || solution.num_candidates == std::ssize(solution.candidates)) break;
     solution.candidates[static_cast<std::size_t>(solution.num_candidates++)] = {
         state, std::exp(-excess / 2)};
     sum += std::exp(-excess / 2);
@@ -199,7 +200,7 @@ void set_candidates(Explanations& found, double scale, BodySolution& solution) {
 BodySolution find_best_body_solution(const InitialStates& initial_states,
                                      const FrameObservations& frame, const BodyProblem& problem) {
   constexpr double hopeless = 100, small = 100, same_m = 1e-4;
-  std::array<double, 6> at_start;
+  std::array<double, kMaxInitialStates> at_start;
   at_start.fill(std::numeric_limits<double>::infinity());
   // Three lamps with unknown roll and pitch: pixels and states are equal in number.
   const bool is_exact = frame.size == 3 && problem.prior.is_tilt_estimated();
@@ -233,9 +234,10 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
     return {is_pose_alone ? FixStatus::degenerate : FixStatus::undetermined, *best};
   }
   for (std::size_t i = 0; is_exact && static_cast<int>(i) < initial_states.count; ++i) {
-    if (std::isinf(found[i].chi_squared) &&
-        is_beyond_linear_range(initial_states.states[i], at_start[i], *best))
-      found[i] = {initial_states.states[i], at_start[i]};
+    const bool is_other_fix =
+        std::isfinite(found[i].chi_squared) && found[i].chi_squared > best->chi_squared;
+    if (!is_other_fix && is_beyond_linear_range(initial_states.states[i], at_start[i], *best))
+      found[kMaxInitialStates + i] = {initial_states.states[i], at_start[i]};
   }
   BodySolution solution{FixStatus::ok, *best};
   if (is_single) return solution;

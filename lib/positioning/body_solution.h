@@ -35,12 +35,15 @@ struct BodySolution {
 /// Returns true if the status is `ok`, `ambiguous` or `undetermined`.
 bool has_fix(const BodySolution& solution);
 
+/// Maximum number of initial states of a fix, and of its candidates.
+inline constexpr std::size_t kMaxInitialStates = 6;
+
 /// Initial states for estimate_body_state().
 struct InitialStates {
   /// `ok`, or the reason of failure.
   FixStatus status = FixStatus::degenerate;
   int count = 0;
-  std::array<BodyState, 6> states;
+  std::array<BodyState, kMaxInitialStates> states;
 
   void add(const InitialStates& others) {
     for (const BodyState& state : others.list()) states[static_cast<std::size_t>(count++)] = state;

@@ -58,10 +58,26 @@ std::vector<Lamp> sorted_by_id(std::vector<Lamp> lamps) {
 bool is_valid_sd(double value) { return std::isfinite(value) && value >= 0; }
 
 /// Returns true if the mean is finite, and the covariance positive definite.
+/// Returns true if covariances of states with a finite variance are equal on both sides of the
+/// diagonal.
+bool is_covariance_symmetric(const BodyCovariance& covariance) {
+  constexpr double tolerance = 1e-9;
+  for (Eigen::Index i = 0; i < kBodyStates; ++i) {
+    for (Eigen::Index k = 0; k < i; ++k) {
+      const double scale = std::sqrt(covariance(i, i) * covariance(k, k));
+      if (std::isfinite(scale) &&
+          !(std::abs(covariance(i, k) - covariance(k, i)) <= tolerance * scale))
+        return false;
+    }
+  }
+  return true;
+}
+
 bool is_valid_prior(const BodyPrior& prior) {
   const auto variances = prior.covariance.diagonal().array();
   const PriorTerms terms = compute_prior_terms(prior, EvaluatedState(BodyState()));
   return (variances >= 0).all() && variances.tail<5>().isFinite().all() &&
+         is_covariance_symmetric(prior.covariance) &&
          compute_state_difference(prior.mean, {}).allFinite() &&
          std::ranges::all_of(terms.list(),
                              [](const PriorTerm& term) { return term.row.allFinite(); });

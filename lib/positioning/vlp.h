@@ -148,7 +148,8 @@ typedef struct vlp_candidate {
 } vlp_candidate;
 
 typedef struct vlp_fix {
-  /* Result of vlp_locate(). The fields after `candidates` are zero unless this is VLP_OK. */
+  /* Status of the fix, or error of vlp_locate_image(). The fields after `candidates` are zero
+   * unless this is VLP_OK. */
   int32_t status;
   /* Number of detections whose id is not in the map; these are ignored. */
   int32_t unknown_lamps;
@@ -197,7 +198,8 @@ int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp
 
 /* Creates a positioner as vlp_open() does, from the lamps of one room of a map whose lamps state a
  * `room`. Null or "" takes all lamps. If lamps of two rooms then share a frequency, vlp_detect()
- * returns VLP_BAD_FILE, and the names of the rooms are in vlp_last_error(). */
+ * and vlp_locate_image() return VLP_BAD_FILE, and the names of the rooms are in vlp_last_error().
+ */
 int32_t vlp_open_room(const char* lamps_yaml, const char* room, const char* calibration_yaml,
                       const vlp_options* options, vlp_positioner** positioner);
 
@@ -252,9 +254,9 @@ int32_t vlp_compute_residuals(const vlp_positioner* positioner, const vlp_detect
 /* Returns one line with the meaning of a status or an error and the remedy. Never null. */
 const char* vlp_describe_status(int32_t code);
 
-/* Returns the message of the last vlp_open(), vlp_open_room() or vlp_detect() of this thread that
- * failed: file, line and key, or the problem with the image, truncated to 1023 bytes. "" before
- * the first failure. Valid until the next call of this thread. */
+/* Returns the message of the last vlp_open(), vlp_open_room(), vlp_detect() or vlp_locate_image()
+ * of this thread that failed: file, line and key, or the problem with the image, truncated to 1023
+ * bytes. "" before the first failure. Valid until the next call of this thread. */
 const char* vlp_last_error(void);
 
 #ifdef __cplusplus

@@ -279,7 +279,7 @@ std::optional<double> find_speed_m_per_s(const std::vector<Fix>& fixes) {
 std::optional<double> find_tilt_rad(const std::vector<Fix>& fixes) {
   std::vector<double> tilts, sigmas;
   for (const Fix& fix : fixes) {
-    if (!fix.has_succeeded()) continue;
+    if (!fix.has_succeeded() || !is_state_estimated(fix, kBodyRoll)) continue;
     const auto& [roll_rad, pitch_rad] = fix.state.motion.inclination;
     tilts.push_back(std::hypot(roll_rad, pitch_rad));
     sigmas.push_back(tilts.back() / std::sqrt(fix.covariance.diagonal().tail<2>().maxCoeff()));
@@ -326,6 +326,7 @@ std::optional<Explanation> explain_by_motion(const LocateResult& result, const L
   if (!speed_m_per_s || *speed_m_per_s > max_speed_m_per_s) return std::nullopt;
   return Explanation{
       estimate_pixel_noise_px(sum_squared_residuals_of_fixes(*fixes)).value_or(0),
+      // [FIX-14] `fit a moving camera` | motion or tilt is not stated | state it, or the option
       fmt::format("the images fit a moving camera, at {:.2g} m/s: state velocities in "
                   "captures.csv, or --max-speed-m-per-s",
                   *speed_m_per_s)};
@@ -334,13 +335,15 @@ std::optional<Explanation> explain_by_motion(const LocateResult& result, const L
 std::optional<Explanation> explain_by_tilt(const LocateResult& result, const LocateInput& input,
                                            bool is_noisy) {
   if (!is_assumed_level(input)) return std::nullopt;
+  constexpr double roll_pitch_sd_rad = 0.15;
   LocateInput tilted = input;
-  tilted.roll_pitch_sd_rad = 0.15;
+  tilted.roll_pitch_sd_rad = roll_pitch_sd_rad;
   const auto fixes = find_better_fixes(result, tilted, input.positioner_options, is_noisy);
   const auto tilt_rad = fixes ? find_tilt_rad(*fixes) : std::nullopt;
   if (!tilt_rad) return std::nullopt;
   return Explanation{
       estimate_pixel_noise_px(sum_squared_residuals_of_fixes(*fixes)).value_or(0),
+      // [FIX-14] `fit a tilted camera`
       fmt::format("the images fit a tilted camera, by {:.2g} degrees: state inclinations in "
                   "captures.csv, or --roll-pitch-sd-deg",
                   deg_from_rad(*tilt_rad))};

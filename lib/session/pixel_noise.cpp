@@ -78,7 +78,7 @@ class CommonUnknowns {
     const auto project = [&](const auto& columns) -> Eigen::MatrixXd {
       return (factors.householderQ().transpose() * columns.topRows(row)).bottomRows(remaining);
     };
-    return FrameResiduals{project(residuals), project(by_errors)};
+    return FrameResiduals{project(residuals), project(by_errors.leftCols(num_columns()))};
   }
 
   Eigen::Index num_columns() const { return 2 + 3 * std::ssize(columns_); }
@@ -122,9 +122,11 @@ NoiseScale estimate_noise_scale(std::span<const Frame> frames, std::span<const F
   double squares = 0, count = 0;
   for (const FrameResiduals& frame : all) {
     if (frame.reduced_chi_squared() > max_reduced) continue;
-    const auto by_errors = frame.by_errors.leftCols(size);
-    information.selfadjointView<Eigen::Lower>().rankUpdate(by_errors.transpose());
-    gradient += by_errors.transpose() * frame.residuals;
+    const Eigen::Index columns = frame.by_errors.cols();
+    information.topLeftCorner(columns, columns)
+        .selfadjointView<Eigen::Lower>()
+        .rankUpdate(frame.by_errors.transpose());
+    gradient.head(columns) += frame.by_errors.transpose() * frame.residuals;
     squares += frame.residuals.squaredNorm();
     count += static_cast<double>(frame.residuals.size());
   }

@@ -235,6 +235,7 @@ void SessionResults::set_steps(std::vector<StepOutputs> steps) {
 
 void SessionResults::publish_outputs() {
   std::error_code missing;
+  fs::remove(folder_ / "session.json", missing);  // until the outputs are complete
   for (const std::string& name : new_outputs_) {
     fs::rename(new_outputs_folder() / name, folder_ / name, missing);
     if (missing) fs::remove(folder_ / name, missing);

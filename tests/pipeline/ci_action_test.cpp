@@ -66,6 +66,9 @@ TEST_F(CiAction, PassesWithAndWithoutAcceptedFixesAndComparesOnlyWithThem) {
   EXPECT_THAT(content("results/comparison.xml"),
               AllOf(HasSubstr("failures=\"0\" errors=\"0\""), HasSubstr("name=\"worse_mm\"")));
   EXPECT_EQ(run_action("accepted=fixes.csv gates=").exit_code, 0);
+  const std::string gates = content("fixes.csv.gates.yaml");
+  EXPECT_EQ(accept("results fixes.csv").exit_code, 0) << "results with the gate";
+  EXPECT_EQ(content("fixes.csv.gates.yaml"), gates);
   folder.file("fixes.csv.gates.yaml", "format: vlp-gates/1\ngates: {mtf50: 0.4}\n");
   EXPECT_EQ(run_action("accepted=fixes.csv gates=").exit_code, 1) << "a blurred lens";
   EXPECT_THAT(content("results/junit.xml"), HasSubstr("mtf50 is 0.2"));

@@ -38,6 +38,8 @@ static_assert(VLP_INCONSISTENT == static_cast<int>(FixStatus::inconsistent));
 static_assert(VLP_MIRRORED_MAP == static_cast<int>(FixStatus::mirrored_map));
 static_assert(VLP_UNDETERMINED == static_cast<int>(FixStatus::undetermined));
 static_assert(VLP_ROW_TIME_UNKNOWN == static_cast<int>(FixStatus::row_time_unknown));
+static_assert(VLP_NOT_IN_MAP == static_cast<int>(DetectionUse::not_in_map));
+static_assert(VLP_REJECTED == static_cast<int>(DetectionUse::rejected));
 
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -195,6 +197,123 @@ TEST_F(CInterface, VlpLocateEqualsCppFixWithOneLampAndSensors) {
   EXPECT_EQ(fix.state.velocity_m_per_s[0], 2);
   EXPECT_EQ(Covariance(fix.covariance)(kBodyVelocity, kBodyVelocity), 0);
   EXPECT_NEAR(Covariance(fix.covariance)(kBodyYawRate, kBodyYawRate), 0.04, 1e-6);
+}
+
+vlp_state convert_state(const BodyState& state) {
+  const auto& [pose, motion] = state;
+  return {{pose.position_m.x(), pose.position_m.y(), pose.position_m.z()},
+          pose.yaw_rad,
+          {motion.velocity_m_per_s.x(), motion.velocity_m_per_s.y()},
+          motion.yaw_rate_rad_per_s,
+          motion.inclination.roll_rad,
+          motion.inclination.pitch_rad};
+}
+
+using StateJacobian = Eigen::Map<const Eigen::Matrix<double, 2, kBodyStates, Eigen::RowMajor>>;
+
+TEST_F(CInterface, VlpProjectEqualsCppProjection) {
+  const auto positioner = open();
+  const vlp_state state = convert_state(rig.body);
+  double pixel[2], jacobian[2 * VLP_STATES];
+  for (const Detection& detection : seen) {
+    const LampProjection expected = rig.positioner().project_lamp(detection.lamp, rig.body);
+    ASSERT_TRUE(expected.pixel.allFinite());
+    ASSERT_EQ(vlp_project(positioner.get(), detection.lamp, &state, pixel, jacobian), VLP_OK);
+    EXPECT_EQ(Eigen::Vector2d(pixel), expected.pixel);
+    EXPECT_EQ(StateJacobian(jacobian), expected.jacobian);
+    EXPECT_NE(jacobian[kBodyPitch], jacobian[VLP_STATES + kBodyPitch]);
+    EXPECT_EQ(vlp_project(positioner.get(), detection.lamp, &state, pixel, nullptr), VLP_OK);
+  }
+  EXPECT_EQ(vlp_project(positioner.get(), 9999, &state, pixel, jacobian), VLP_BAD_ARGUMENT);
+}
+
+TEST_F(CInterface, VlpComputeResidualsEqualsCppResiduals) {
+  rig.body.motion = {};
+  seen = seen_from(rig, 0.1);
+  seen[1].pixel.x() += 30;
+  seen.push_back({9999, {100, 100}, 0.1});
+  given.clear();
+  for (const Detection& one : seen)
+    given.push_back({one.lamp, one.pixel.x(), one.pixel.y(), *one.sigma_px});
+  const auto positioner = open();
+  const vlp_fix fix = located(positioner.get(), nullptr);
+  ASSERT_EQ(fix.status, VLP_OK);
+  ASSERT_EQ(fix.rejected_lamps, 1);
+  const Fix expected_fix = rig.positioner().compute_position_fix(seen);
+  std::vector<vlp_residual> residuals(given.size());
+  ASSERT_EQ(
+      vlp_compute_residuals(positioner.get(), given.data(), given.size(), &fix, residuals.data()),
+      VLP_OK);
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const auto expected = rig.positioner().compute_detection_residual(seen[i], expected_fix);
+    EXPECT_EQ(residuals[i].use, static_cast<int>(expected.use));
+    if (expected.use == DetectionUse::not_in_map) {
+      EXPECT_TRUE(std::isnan(residuals[i].residual_px[0]));
+      continue;
+    }
+    EXPECT_EQ(Eigen::Vector2d(residuals[i].predicted_px), expected.predicted.pixel);
+    EXPECT_EQ(Eigen::Vector2d(residuals[i].residual_px), expected.residual_px);
+    EXPECT_EQ(StateJacobian(residuals[i].jacobian), expected.predicted.jacobian);
+  }
+  EXPECT_EQ(residuals[1].use, VLP_REJECTED);
+  EXPECT_NEAR(residuals[1].residual_px[0], 30, 1e-3);
+  EXPECT_EQ(residuals.back().use, VLP_NOT_IN_MAP);
+  vlp_fix none = {};
+  none.status = VLP_DEGENERATE;
+  EXPECT_EQ(
+      vlp_compute_residuals(positioner.get(), given.data(), given.size(), &none, residuals.data()),
+      VLP_BAD_ARGUMENT);
+}
+
+TEST_F(CInterface, VlpLocateEqualsCppFixWithCorrelatedPrior) {
+  StatePrior same{rig.body, BodyCovariance::Zero()};
+  for (int i = 0; i < kBodyStates; ++i) same.covariance(i, i) = std::pow(0.01 * (i + 1), 2);
+  same.covariance(0, kBodyYaw) = same.covariance(kBodyYaw, 0) = 0.5 * 0.01 * 0.04;
+  vlp_prior prior = {};
+  prior.mean = convert_state(same.mean);
+  for (int row = 0; row < kBodyStates; ++row) {
+    for (int column = 0; column < kBodyStates; ++column)
+      prior.covariance[kBodyStates * row + column] = same.covariance(row, column);
+  }
+  vlp_sensors sensors = {};
+  sensors.prior = &prior;
+  Sensors expected;
+  expected.prior = same;
+  const auto positioner = open();
+  expect_same(located(positioner.get(), &sensors),
+              rig.positioner().compute_position_fix(seen, expected));
+  prior.covariance[kBodyYaw] = 0;  // one side of the diagonal only
+  EXPECT_EQ(located(positioner.get(), &sensors).status, VLP_NOT_FINITE);
+}
+
+TEST_F(CInterface, VlpLocateListsCandidatesOfAmbiguousFix) {
+  rig.body.motion = {{0, 0}, 0, {0.3, -0.2}};
+  seen = seen_from(rig, 0.1);
+  seen.resize(3);
+  given.clear();
+  for (const Detection& one : seen)
+    given.push_back({one.lamp, one.pixel.x(), one.pixel.y(), *one.sigma_px});
+  vlp_sensors sensors = {};
+  sensors.inclination_sigma_rad = 1;
+  Sensors same;
+  same.inclination_sigma_rad = 1;
+  const vlp_fix fix = located(open().get(), &sensors);
+  const Fix expected = rig.positioner().compute_position_fix(seen, same);
+  ASSERT_EQ(fix.status, VLP_AMBIGUOUS);
+  ASSERT_GT(fix.num_candidates, 1);
+  ASSERT_EQ(fix.num_candidates, expected.num_candidates);
+  double sum = 0, nearest_m = 1;
+  for (int i = 0; i < fix.num_candidates; ++i) {
+    const vlp_candidate& candidate = fix.candidates[i];
+    const FixCandidate& other = expected.candidates[static_cast<std::size_t>(i)];
+    EXPECT_EQ(candidate.likelihood, other.likelihood);
+    EXPECT_EQ(Eigen::Vector3d(candidate.state.position_m), other.state.pose.position_m);
+    sum += candidate.likelihood;
+    nearest_m = std::min(
+        nearest_m, (Eigen::Vector3d(candidate.state.position_m) - rig.body.pose.position_m).norm());
+  }
+  EXPECT_NEAR(sum, 1, 1e-9);
+  EXPECT_LT(nearest_m, 1e-3);
 }
 
 TEST_F(CInterface, VlpLocateWithEarlierEqualsCppFix) {

@@ -49,14 +49,14 @@ struct KnownPosition {
   double sd_m;
 };
 
-/// Knowledge of the positions of the lamps.
+/// Knowledge of the positions of the lamps. AdjustmentResult::surveyed_covariance is defined for
+/// `survey` only.
 enum class MapPrior {
   /// Each position with its sd_m.
   survey,
   /// Only translation, yaw and scale of the map, exactly, because captures do not determine them.
   /// The corrections d of the detected lamps, at p relative to their mean, satisfy
   ///   sum d = 0,   sum (p x d)_z = 0,   sum p . d = 0
-  /// AdjustmentResult::surveyed_covariance is then not defined.
   frame,
   /// Height of each lamp with its sd_m (exact without one), and horizontally only translation and
   /// yaw, exactly, and scale. sum p . d then has the standard deviation that follows from sd_m.

@@ -16,7 +16,8 @@ namespace vlp {
 struct RotationOutlier {
   /// Index in RotationCaptures::observations of the rejected observation.
   std::size_t observation;
-  /// Distance from the position that the fit predicts, in px.
+  /// Distance from the position that the fit predicts, in px; infinite if the lens does not image
+  /// the lamp.
   double distance_px;
 };
 

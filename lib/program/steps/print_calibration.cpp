@@ -38,7 +38,7 @@ void print_lever_arm(const RotationCenter& center) {
 
 void print_residuals(const RotationFit& fit, const RotationCaptures& rotation) {
   fmt::print("residual    {:.4f} px per axis, of {} detections\n", fit.residual_px,
-             rotation.observations.size() - fit.outliers.size());
+             fit.used_observations.size());
   fmt::print("outliers    {}\n", fit.outliers.size());
   for (const auto& [index, distance_px] : fit.outliers) {
     const RotationObservation& observation = rotation.observations[index];
@@ -136,10 +136,9 @@ void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& 
   }
   print_residuals(fit, rotation);
   fmt::print("\n{:>10} {:>10}  image\n", "z (m)", "yaw (deg)");
-  for (std::size_t i = 0; i < rotation.captures.size(); ++i) {
-    const RotationCapture& capture = rotation.captures[i];
+  for (const RotationCapture& capture : rotation.captures) {
     fmt::print("{:>10} {:10.3f}  {}\n", format_height_m(rotation.heights[capture.height].z_m),
-               deg_from_rad(wrap_angle_rad(rotation.captures[i].yaw_rad)),
+               deg_from_rad(wrap_angle_rad(capture.yaw_rad)),
                escape_text_for_single_line(capture.image));
   }
 }
