@@ -282,6 +282,9 @@ TEST(ComputePosesFromThreeLamps, ContainsTruePoseForRandomScenes) {
   EXPECT_GE(exact, draws - 5);
 }
 
+/// Largest error of rays of an exact pose; others are between two solutions that have vanished.
+constexpr double kMaxExactError = 1e-6;
+
 /// Returns the largest sine of the angle between a lamp's direction from the pose and its ray.
 double compute_max_ray_error(const FreePose& pose, const std::array<Eigen::Vector3d, 3>& lamps_m,
                              const std::array<Eigen::Vector3d, 3>& rays) {
@@ -297,7 +300,7 @@ double compute_max_ray_error(const FreePose& pose, const std::array<Eigen::Vecto
 /// Newton's method refines the distances to rounding.
 TEST(ComputePosesFromThreeLamps, PosesMatchRaysToRounding) {
   Random random(7);
-  int num_poses = 0, num_exact = 0;
+  int num_poses = 0, num_exact = 0, num_between = 0;
   for (int i = 0; i < 1000; ++i) {
     std::array<Eigen::Vector3d, 3> lamps_m, rays;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -306,19 +309,21 @@ TEST(ComputePosesFromThreeLamps, PosesMatchRaysToRounding) {
     }
     const ThreeLampPoses found = compute_poses_from_three_lamps(lamps_m, rays);
     for (std::size_t k = 0; k < static_cast<std::size_t>(found.count); ++k) {
-      ++num_poses;
-      num_exact += compute_max_ray_error(found.poses[k], lamps_m, rays) < 1e-13;
+      const double error = compute_max_ray_error(found.poses[k], lamps_m, rays);
+      ++(error < kMaxExactError ? num_poses : num_between);
+      num_exact += error < 1e-13;
     }
   }
   EXPECT_GT(num_poses, 1000);
-  // The others are between two solutions that have vanished.
-  EXPECT_GE(num_exact, num_poses * 9 / 10);
+  EXPECT_LT(num_between, num_poses / 10);
+  // Nearly equal solutions amplify rounding errors.
+  EXPECT_GE(num_exact, num_poses - num_poses / 100);
 }
 
 /// Rays of other points than the lamps: some have no pose, and nearly all poses match the rays.
 TEST(ComputePosesFromThreeLamps, ReturnsPosesOfRandomRaysOnlyIfTheyMatch) {
   Random random(8);
-  int num_without_pose = 0, num_poses = 0, num_matches = 0;
+  int num_without_pose = 0, num_poses = 0, num_matches = 0, num_between = 0;
   for (int i = 0; i < 1000; ++i) {
     std::array<Eigen::Vector3d, 3> lamps_m, rays;
     for (std::size_t k = 0; k < 3; ++k) {
@@ -332,13 +337,15 @@ TEST(ComputePosesFromThreeLamps, ReturnsPosesOfRandomRaysOnlyIfTheyMatch) {
       const FreePose& pose = found.poses[k];
       EXPECT_THAT(Eigen::Matrix3d(pose.camera_from_world * pose.camera_from_world.transpose()),
                   IsNear(Eigen::Matrix3d(Eigen::Matrix3d::Identity()), 1e-9));
-      ++num_poses;
-      num_matches += compute_max_ray_error(pose, lamps_m, rays) < 1e-9;
+      const double error = compute_max_ray_error(pose, lamps_m, rays);
+      ++(error < kMaxExactError ? num_poses : num_between);
+      num_matches += error < 1e-9;
     }
   }
   EXPECT_GT(num_without_pose, 10);
   EXPECT_GT(num_poses, 400);
-  EXPECT_GE(num_matches, num_poses * 4 / 5);
+  EXPECT_LT(num_between, num_poses / 4);
+  EXPECT_GE(num_matches, num_poses - num_poses / 50);
 }
 
 TEST(ComputePosesFromThreeLamps, ReturnsNoPoseForCollinearLamps) {
