@@ -38,8 +38,9 @@ constexpr double kMaxWhiteFraction = 0.65;
 constexpr std::size_t kMaxLines = 5;
 
 bool is_overexposed(const Light& light, const cv::Mat& image) {
-  const cv::Point low(static_cast<int>(light.box_min.x()), static_cast<int>(light.box_min.y()));
-  const cv::Point high(static_cast<int>(light.box_max.x()), static_cast<int>(light.box_max.y()));
+  const cv::Point low(static_cast<int>(light.box.min().x()), static_cast<int>(light.box.min().y()));
+  const cv::Point high(static_cast<int>(light.box.max().x()),
+                       static_cast<int>(light.box.max().y()));
   return light.kind == LightKind::unknown &&
          compute_saturated_fraction(image, {low, high}) > kMaxWhiteFraction;
 }
@@ -348,9 +349,9 @@ Observation LampIntake::detect_lamps_in_image(const SourceImage& source) const {
   });
   if (!options_.annotate.empty() && !pixels.empty()) {
     write_annotated_image(options_.annotate, source.file,
-                          render_annotated_image(pixels, result.lights, result.readout));
+                          render_annotated_image(pixels, result.lights));
   }
-  for (Light& light : result.lights) std::vector<EdgePoint>().swap(light.outline);
+  for (Light& light : result.lights) std::vector<Eigen::Vector2d>().swap(light.outline);
   return result;
 }
 

@@ -21,9 +21,17 @@ namespace {
 
 std::string_view outline_name(const Light& light) {
   if (light.kind == LightKind::no_outline) return "";
-  if (light.is_glow) return "glow";
-  if (!is_light_disc_shaped(light)) return get_lamp_shape_traits(light.shape).name;
-  return light.is_uneven ? "rim" : "edge";
+  switch (light.outline_kind) {
+    case LightOutline::none:
+      return "glow";
+    case LightOutline::edge:
+      return "edge";
+    case LightOutline::rim:
+      return "rim";
+    case LightOutline::rectangle:
+      return "rectangle";
+  }
+  return "";
 }
 
 template <typename Names, typename Enumerator>
@@ -144,11 +152,12 @@ std::string describe_light(const Light& light) {
   const Stripes& stripes = light.stripes;
   line += fmt::format(
       ", {} {:.0f} % {}, contrast {:.2f}", outline_name(light), 100 * light.inlier_fraction,
-      get_lamp_shape_traits(light.shape).is_round ? "round" : "straight", stripes.contrast);
+      light.outline_kind == LightOutline::rectangle ? "straight" : "round", stripes.contrast);
   if (!(stripes.period_lines > 0)) return line;
-  return line + fmt::format(
-                    ", {:.1f} periods of {:.2f} lines, periodicity_r2 {:.2f}, coherence {:.2f}",
-                    stripes.periods, stripes.period_lines, stripes.periodicity_r2, light.coherence);
+  return line +
+         fmt::format(", {:.1f} periods of {:.2f} lines, periodicity_r2 {:.2f}, coherence {:.2f}",
+                     stripes.periods, stripes.period_lines, stripes.periodicity_r2,
+                     stripes.coherence);
 }
 
 void write_lights_table(const std::filesystem::path& file, std::span<const Observation> images) {
@@ -171,7 +180,7 @@ void write_lights_table(const std::filesystem::path& file, std::span<const Obser
            number_if(form, light.rise_px), number_if(form, light.inlier_fraction),
            number_if(form, stripes.contrast), number_if(striped, stripes.period_lines),
            number_if(striped, stripes.periods), number_if(striped, stripes.periodicity_r2),
-           number_if(striped, light.coherence), number_if(striped, stripes.duty)});
+           number_if(striped, stripes.coherence), number_if(striped, stripes.duty)});
     }
   }
   csv.save_file();
@@ -223,9 +232,9 @@ void draw_label(cv::Mat& annotated_image, const Light& light, double size) {
   const double scale = 0.5 * size;
   const cv::Size box = cv::getTextSize(label, cv::FONT_HERSHEY_SIMPLEX, scale, thickness, nullptr);
   const int gap = static_cast<int>(3 * size);
-  int left = static_cast<int>(light.box_max.x()) + gap;
+  int left = static_cast<int>(light.box.max().x()) + gap;
   if (left + box.width > annotated_image.cols)
-    left = static_cast<int>(light.box_min.x()) - gap - box.width;
+    left = static_cast<int>(light.box.min().x()) - gap - box.width;
   const int bottom = std::clamp(static_cast<int>(light.pixel.y()) + box.height / 2, box.height,
                                 std::max(box.height, annotated_image.rows - 1));
   cv::putText(annotated_image, label, {std::max(0, left), bottom}, cv::FONT_HERSHEY_SIMPLEX, scale,
@@ -234,16 +243,13 @@ void draw_label(cv::Mat& annotated_image, const Light& light, double size) {
 
 }  // namespace
 
-cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& lights,
-                               Readout readout) {
+cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& lights) {
   cv::Mat annotated_image = brighten_image(image);
   const double size = std::max(1.0, annotated_image.cols / 1000.0);  // of letters and crosses
   const int thickness = static_cast<int>(std::lround(size));
   for (const Light& light : lights) {
     const cv::Scalar color = choose_color(light.kind);
-    for (const EdgePoint& edge : light.outline) {
-      const Eigen::Vector2d at =
-          readout == Readout::rows ? edge.pixel : Eigen::Vector2d(edge.pixel.reverse());
+    for (const Eigen::Vector2d& at : light.outline) {
       cv::circle(annotated_image, to_fixed_point(at), to_fixed_point({size, 0}).x, color,
                  cv::FILLED, cv::LINE_AA, kShift);
     }

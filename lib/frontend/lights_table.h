@@ -52,8 +52,7 @@ void write_lights_table(const std::filesystem::path& file, std::span<const Obser
 /// yellow, unknown ones red, unmodulated ones blue, and lights without outline gray.
 ///
 /// @param image  one channel of 8 or 16 bits
-cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& lights,
-                               Readout readout);
+cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& lights);
 
 /// Writes an annotated image atomically as PNG into `folder`, named like the image with `.png`
 /// appended.

@@ -3,8 +3,8 @@
 #include "lamps/light_detector.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <span>
@@ -29,15 +29,6 @@
 namespace vlp {
 
 namespace {
-
-/// Function that fits a light to a blob with the outline of find_blob_outline(), for lamps of one
-/// shape with the sizes `sizes_m`. Returns std::nullopt if the blob has another shape. See
-/// fit_rectangular_light().
-using ShapeDetector = decltype(&fit_rectangular_light);
-
-/// Detectors of all shapes but discs, see LightShape, in the order in which they are tried.
-constexpr auto kShapeDetectors = std::to_array<std::pair<ShapeKind, ShapeDetector>>(
-    {{ShapeKind::rectangle, &fit_rectangular_light}});
 
 /// Returns the largest number of lines without light between two stripes of a lamp.
 int compute_max_dark_rows(const LampMap& lamps, const std::optional<double>& row_time_s) {
@@ -64,9 +55,10 @@ bool is_full_scale_level(double level, int bits_per_pixel) {
   return false;
 }
 
-/// Returns Light::clipped_fraction of a steady light.
-double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
-                        const Eigen::Vector2d& high) {
+/// Returns the fraction of the pixels in the middle of a box that have the level of its brightest
+/// pixel; 0 if this level is not full scale.
+double compute_clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
+                                const Eigen::Vector2d& high) {
   const Eigen::Vector2d middle = (low + high) / 2, size = (high - low) / 2;
   const ImageView pixels = lines.crop_to_box(
       {static_cast<int>(std::lround(middle.x() - size.x() / 2)),
@@ -88,8 +80,8 @@ double clipped_fraction(const ImageView& lines, const Eigen::Vector2d& low,
 
 /// Adds the error of an unknown lens to the sigma of the lights. Must be called last, because
 /// keep_best_light_of_lamp() compares sigmas without this error.
-void add_error_of_unknown_lens(const ImageSize& size, std::vector<Light>& lights) {
-  for (Light& light : lights) {
+void add_error_of_unknown_lens(const ImageSize& size, std::vector<MeasuredLight>& lights) {
+  for (MeasuredLight& light : lights) {
     if (light.kind == LightKind::no_outline) continue;
     add_error_to_center_sigma(predict_center_sd_without_lens_px(light, size), light);
   }
@@ -98,10 +90,10 @@ void add_error_of_unknown_lens(const ImageSize& size, std::vector<Light>& lights
 /// Maximum width of a sharp edge, as a fraction of the radius.
 constexpr double kMaxRise = 0.3;
 
-bool is_outline_sharp(const Light& light) { return light.rise_px <= kMaxRise * light.radius_px; }
-
+/// Returns true if the light is evenly lit and has a sharp outline, in which its stripes can be
+/// measured.
 bool has_clear_outline(const Light& light) {
-  return !light.is_glow && !light.is_doubtful && is_outline_sharp(light) &&
+  return has_even_outline(light) && light.rise_px <= kMaxRise * light.radius_px &&
          light.inlier_fraction >= kMinInlierFraction;
 }
 
@@ -111,16 +103,12 @@ bool are_at_same_position(const Light& a, const Light& b) {
 }
 
 /// Returns the reason why a light is steady; std::nullopt if it is modulated.
-std::optional<LightReason> find_reason_for_steady_light(const Light& light) {
-  constexpr double min_clarity = 0.5, min_clipped = 0.5;
-  const Stripes& stripes = light.stripes;
-  if (!(stripes.contrast >= kMinContrast)) {
-    return light.clipped_fraction > min_clipped ? LightReason::overexposed
-                                                : LightReason::unmodulated;
-  }
+std::optional<LightReason> find_reason_for_steady_light(const Stripes& stripes) {
+  constexpr double min_clarity = 0.5;
+  if (!(stripes.contrast >= kMinContrast)) return LightReason::unmodulated;
   if (!(stripes.periods >= kMinPeriods)) return LightReason::too_few_periods;
   if (!(stripes.periodicity_r2 >= min_clarity)) return LightReason::no_clear_period;
-  if (!(light.coherence >= kMinCoherence)) return LightReason::no_clear_period;
+  if (!(stripes.coherence >= kMinCoherence)) return LightReason::no_clear_period;
   return std::nullopt;
 }
 
@@ -147,49 +135,63 @@ Blob clip(std::span<const Blob> blobs, const PixelBox& box) {
   return result;
 }
 
-/// Returns the lit pixels of a light: the blob of which the light is the largest part, or the runs
-/// near its box.
+int count_pixels(const Blob& blob) {
+  int count = 0;
+  for (const PixelRun& run : blob.runs) count += run.pixel_run_width_px();
+  return count;
+}
+
+/// Returns the lit pixels of a light: the blob with most lit pixels in its box, or the runs near
+/// its box if there are several blobs or if the blob is larger.
 Blob find_lit_pixels_of_light(const PixelBox& box, std::span<const Blob> blobs,
                               const ImageSize& size) {
-  constexpr int max_area_ratio = 4;
+  constexpr double min_fraction = 0.8, max_area_ratio = 1.4;
+  const Blob* best = nullptr;
+  int most = 0, total = 0;
   for (const Blob& blob : blobs) {
-    const PixelBox whole = blob.blob_bounding_box();
-    const bool is_most = 2 * intersect_boxes(whole, box).area_px() > box.area_px();
-    if (is_most && whole.area_px() < max_area_ratio * box.area_px()) return blob;
+    const int count = count_pixels(clip({&blob, 1}, box));
+    total += count;
+    if (count > most) best = &blob, most = count;
   }
+  if (best != nullptr && most > min_fraction * total &&
+      best->blob_bounding_box().area_px() < max_area_ratio * box.area_px())
+    return *best;
   return clip(blobs, expand_and_clip_box(box, std::max(box.width, box.height) / 4, size));
 }
 
-Light make_light_without_outline(const ImageView& lines, const ModulatedLight& found,
-                                 const LightShape& shape) {
-  Light light{};
-  light.pixel = shape.swap_image_and_scanline_axes(found.center);
-  light.sigma_px = std::clamp(found.center_sd_px, kMinSigma_px, kMaxSigma_px);
-  light.radius_px = found.radius_px;
-  const PixelBox& box = found.box;
-  light.box_min = shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5});
-  light.box_max = shape.swap_image_and_scanline_axes(
-      {std::min(box.end_column(), lines.width) - 0.5, std::min(box.end_row(), lines.height) - 0.5});
-  light.rise_px = found.radius_px / 2;
+MeasuredLight make_light_without_outline(const PixelBox& box, const LightShape& shape) {
+  MeasuredLight light{};
+  light.reason = LightReason::unknown_period;
+  light.box = {shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5}),
+               shape.swap_image_and_scanline_axes({box.end_column() - 0.5, box.end_row() - 0.5})};
+  light.pixel = light.box.center();
+  light.radius_px = light.box.sizes().mean() / 2;
   light.inlier_fraction = 1;
-  light.is_glow = true;
   return light;
 }
 
-/// Converts a light that was found by its modulation to a Light. Without a rim the light has no
-/// outline, and its center is the centroid of the lit area. Kind, reason and lamp are not set.
-///
-/// @param lines  image whose rows are the scanlines
-Light make_light_from_modulation(const ImageView& lines, const ModulatedLight& found,
-                                 std::optional<Light> rim, const LightShape& shape) {
-  Light light = make_light_without_outline(lines, found, shape);
-  // The rim of another object, for example of a letter, does not enclose the light's center.
-  if (rim && (rim->pixel - light.pixel).norm() < rim->radius_px) light = std::move(*rim);
-  light.is_found_by_modulation = true;
+/// Converts a light that was found by its modulation. Without an outline its center is the centroid
+/// of the lit area. Kind and lamp are not set.
+MeasuredLight make_light_from_modulation(const ModulatedLight& found,
+                                         std::optional<MeasuredLight> outline,
+                                         const LightShape& shape) {
+  MeasuredLight light = make_light_without_outline(found.box, shape);
+  light.pixel = shape.swap_image_and_scanline_axes(found.center);
+  light.sigma_px = std::clamp(found.center_sd_px, kMinSigma_px, kMaxSigma_px);
+  light.radius_px = found.radius_px;
+  light.rise_px = found.radius_px / 2;
+  // The outline of another object, for example of a letter, does not enclose the light's center.
+  if (outline && (outline->pixel - light.pixel).norm() < outline->radius_px)
+    light = std::move(*outline);
+  light.reason = LightReason::unknown_period;
   light.stripes = found.stripes;
   light.peak_level = found.peak_level;
-  light.coherence = found.phase_coherence;
   return light;
+}
+
+/// Returns true if the image border cuts no part of a box.
+bool is_box_inside_image(const PixelBox& box, const ImageSize& size) {
+  return box.x > 0 && box.y > 0 && box.end_column() < size.width && box.end_row() < size.height;
 }
 
 /// Merges boxes that overlap, until none do.
@@ -235,7 +237,8 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
       classifier_(std::move(classifier)),
       max_dark_rows_(compute_max_dark_rows(lamps, camera.row_time_s)) {
   for (const Lamp& lamp : lamps_.lamps) {
-    if (lamp.shape.size_m) sizes_m_[lamp.shape.kind].push_back(*lamp.shape.size_m);
+    if (lamp.shape.size_m && lamp.shape.kind == ShapeKind::rectangle)
+      rectangle_sizes_m_.push_back(*lamp.shape.size_m);
   }
   if (!camera_.row_time_s || classifier_) return;
   for (const Lamp& lamp : lamps_.lamps) {
@@ -272,197 +275,177 @@ LightDetector LightDetector::copy_detector_with_readout_direction(Readout readou
   return {lamps_, camera, classifier_};
 }
 
-std::vector<LightPart> LightDetector::find_light_parts(const ImageView& lines, const Blob& blob,
-                                                       const Background& background) const {
-  constexpr std::size_t max_lights = 4;
-  const PixelBox box = blob.blob_bounding_box();
-  std::vector<LightPart> parts;
-  auto remaining = find_blob_outline(lines, blob, background);
-  for (const auto& [kind, detect] : kShapeDetectors) {
-    const auto sizes_m = sizes_m_.find(kind);
-    if (sizes_m == sizes_m_.end()) continue;
-    if (auto light = detect(lines, blob, remaining, background, shape_, sizes_m->second)) {
-      light->shape = kind;
-      return {{std::move(light), {}, box}};
-    }
-  }
-  while (parts.size() < max_lights) {
-    auto light = shape_.fit_light_to_outline(remaining, background);
-    if (!light && !parts.empty()) break;
-    auto outline = std::move(remaining);
-    remaining = light ? shape_.find_outline_points_outside_light(*light, outline)
-                      : std::vector<EdgePoint>();
-    parts.push_back({std::move(light), std::move(outline), box});
-    if (remaining.empty()) break;
-  }
-  for (LightPart& part : parts) {
-    if (part.light)
-      part.light->outside_ratio = double(remaining.size()) / double(part.light->outline.size());
-  }
-  constexpr double min_edge_roundness = 0.5;
-  // Each of several touching lights has an edge; their brightness may differ.
-  const auto sharp_parts = std::count_if(parts.begin(), parts.end(), [](const LightPart& part) {
-    return part.light && is_outline_sharp(*part.light);
-  });
-  const std::optional<Light>& first = parts.front().light;
-  const bool has_edge =
-      sharp_parts > 1 || (sharp_parts == 1 && first && is_outline_sharp(*first) &&
-                          first->inlier_fraction >= min_edge_roundness &&
-                          !is_blob_unevenly_lit(lines, blob, first->outline, background));
-  for (LightPart& part : parts) {
-    if (part.light) part.light->is_doubtful = !has_edge;
-  }
-  return parts;
-}
-
-void LightDetector::add_lights_found_by_modulation(const ImageView& lines,
-                                                   const std::vector<Blob>& blobs,
-                                                   const Background& background,
-                                                   std::vector<Light>& lights) const {
-  const auto is_conclusive = [&](const Light& light) {
-    if (!has_clear_outline(light)) return false;
-    const auto steady = find_reason_for_steady_light(light);
-    if (steady) return *steady == LightReason::unmodulated || *steady == LightReason::overexposed;
-    return identify_lamp_by_stripes(light.stripes).has_value();
-  };
+std::vector<PixelBox> LightDetector::find_search_boxes(const std::vector<Blob>& blobs,
+                                                       const ImageSize& size) const {
   std::vector<PixelBox> boxes;
   for (const Blob& blob : blobs) {
     const PixelBox box = blob.blob_bounding_box();
-    const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
-    const bool is_known = std::any_of(lights.begin(), lights.end(), [&](const Light& light) {
-      return is_conclusive(light) &&
-             (shape_.swap_image_and_scanline_axes(light.pixel) - middle).norm() <
-                 light.radius_px / 2 &&
-             std::max(box.width, box.height) < 3 * light.radius_px;
-    });
-    if (is_known) continue;
     // Stripes with a long dark part are blobs of their own.
     const int margin_px = std::max(std::max(box.width, box.height) / 2, max_dark_rows_);
-    boxes.push_back(expand_and_clip_box(box, margin_px, lines.size()));
+    boxes.push_back(expand_and_clip_box(box, margin_px, size));
   }
-  const auto modulated_lights = find_modulated_lights(
-      lines, merge_overlapping_boxes(std::move(boxes)), background, lamp_periods_);
-  const auto find_identified_lamp = [&](const Light& light) {
-    const auto id = is_conclusive(light) ? identify_lamp_by_stripes(light.stripes) : std::nullopt;
-    return id ? find_lamp_by_id(lamps_.lamps, *id) : nullptr;
-  };
-  std::vector<LampInPlane> lamps;
-  for (const Light& light : lights) {
-    const auto lamp = make_lamp_in_plane(find_identified_lamp(light), light.pixel, kCentroidSd);
-    if (lamp) lamps.push_back(*lamp);
-  }
-  RimFits fitted = fit_rims(lines, modulated_lights, blobs, background, lamps);
-  std::vector<std::optional<Light>>& rims = fitted.rims;
-  // The edge of a source in a reflector is a clear outline with another radius than its lamp.
-  const auto has_other_radius = [&](const Light& light) {
-    const auto radius = predict_radius(find_identified_lamp(light), fitted.inverse_height);
-    return radius && !radius->agrees_with(light);
-  };
-  const auto num_others = std::count_if(lights.begin(), lights.end(), has_other_radius);
-  const auto num_clear =
-      std::count_if(rims.begin(), rims.end(), [](const auto& rim) { return rim.has_value(); });
-  const bool are_sizes_correct = 2 * num_others <= std::ptrdiff_t(lamps.size()) + num_clear;
-  for (Light& light : lights) {
-    if (!are_sizes_correct || !has_other_radius(light)) continue;
-    const auto radius = predict_radius(find_identified_lamp(light), fitted.inverse_height);
-    const Eigen::Vector2d low = shape_.swap_image_and_scanline_axes(light.box_min),
-                          high = shape_.swap_image_and_scanline_axes(light.box_max);
-    const PixelBox box{static_cast<int>(low.x()), static_cast<int>(low.y()),
-                       static_cast<int>(high.x() - low.x()), static_cast<int>(high.y() - low.y())};
-    const Blob blob = find_lit_pixels_of_light(box, blobs, lines.size());
-    std::optional<Light> rim;
-    if (!blob.runs.empty()) {
-      rim = fit_rim_of_light(lines, blob, light.stripes.period_lines, background, shape_, radius);
-    }
-    if (!rim) {
-      add_error_to_center_sigma(light.radius_px, light);
-      light.outline_equations.reset();  // their center is not that of the lamp
-      continue;
-    }
-    rim->stripes = light.stripes;
-    rim->peak_level = light.peak_level;
-    rim->coherence = light.coherence;
-    light = std::move(*rim);
-  }
-  for (std::size_t i = 0; i < modulated_lights.size(); ++i) {
-    const ModulatedLight& found = modulated_lights[i];
-    const auto is_at_found = [&](const Light& other) {
-      return (other.pixel - shape_.swap_image_and_scanline_axes(found.center)).norm() <
-             std::max(other.radius_px, found.radius_px);
-    };
-    if (!found.lamp && std::any_of(lights.begin(), lights.end(), is_at_found)) continue;
-    Light light = make_light_from_modulation(lines, found, std::move(rims[i]), shape_);
-    if (found.lamp) light.lamp = lamps_by_period_[*found.lamp];
-    // Lamps with the same period differ in duty; without known periods a classifier decides.
-    const bool has_choice = found.lamp ? !light.lamp : lamp_periods_.empty();
-    if (has_choice) light.lamp = identify_lamp_by_stripes(light.stripes);
-    const auto is_at_it = [&](const Light& other) { return are_at_same_position(other, light); };
-    const auto is_better = [&](const Light& other) {
-      return is_at_it(other) &&
-             (!found.lamp || other.is_found_by_modulation || is_conclusive(other));
-    };
-    if (std::any_of(lights.begin(), lights.end(), is_better)) continue;
-    std::erase_if(lights, is_at_it);
-    lights.push_back(std::move(light));
-  }
+  return merge_overlapping_boxes(std::move(boxes));
 }
 
-LightDetector::RimFits LightDetector::fit_rims(const ImageView& lines,
-                                               const std::vector<ModulatedLight>& found,
-                                               const std::vector<Blob>& blobs,
-                                               const Background& background,
-                                               const std::vector<LampInPlane>& lamps) const {
+void LightDetector::add_striped_blobs(const ImageView& lines, const std::vector<Blob>& blobs,
+                                      const Background& background,
+                                      std::vector<ModulatedLight>& found) const {
+  const std::span<const ModulatedLight> others(found.data(), found.size());
+  std::vector<ModulatedLight> added;
+  for (const Blob& blob : blobs) {
+    ModulatedLight light{};
+    light.box = blob.blob_bounding_box();
+    light.center = {light.box.x + light.box.width / 2.0, light.box.y + light.box.height / 2.0};
+    light.radius_px = light.center_sd_px = (light.box.width + light.box.height) / 4.0;
+    const bool is_found = std::ranges::any_of(others, [&](const ModulatedLight& other) {
+      return (other.center - light.center).norm() < std::max(other.radius_px, light.radius_px);
+    });
+    if (is_found) continue;
+    light.stripes = measure_stripes_in_box(lines, light.box, background);
+    if (!(light.stripes.period_lines > 0) || light.stripes.contrast < kMinContrast) continue;
+    light.fit.period_lines = light.stripes.period_lines;
+    light.requires_outline = true;
+    added.push_back(std::move(light));
+  }
+  std::ranges::move(added, std::back_inserter(found));
+}
+
+std::optional<MeasuredLight> LightDetector::fit_outline(
+    const ImageView& lines, const ModulatedLight& found, const std::vector<Blob>& blobs,
+    const Background& background, const std::optional<InverseHeight>& inverse_height) const {
+  const Blob blob = find_lit_pixels_of_light(found.box, blobs, lines.size());
+  if (blob.runs.empty()) return std::nullopt;
+  const Lamp* lamp = find_lamp_of_period(found);
+  if (!rectangle_sizes_m_.empty() && (!lamp || lamp->shape.kind == ShapeKind::rectangle)) {
+    auto light = fit_rectangular_light(lines, blob, find_blob_outline(lines, blob, background),
+                                       background, shape_, rectangle_sizes_m_);
+    if (light) return light;
+  }
+  return fit_rim_of_light(lines, blob, found.fit.period_lines, background, shape_,
+                          predict_radius(lamp, inverse_height));
+}
+
+std::vector<MeasuredLight> LightDetector::measure_lights(const ImageView& lines,
+                                                         const std::vector<ModulatedLight>& found,
+                                                         OutlineFits fits,
+                                                         const Background& background) const {
+  std::vector<MeasuredLight> lights;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    MeasuredLight light = make_light_from_modulation(found[i], std::move(fits.outlines[i]), shape_);
+    const auto is_taken = [&] {
+      return std::ranges::any_of(
+          lights, [&](const Light& other) { return are_at_same_position(other, light); });
+    };
+    // Lights that touch may have found the same outline.
+    if (is_taken()) light = make_light_from_modulation(found[i], {}, shape_);
+    if (is_taken() || (found[i].requires_outline && !has_outline(light))) continue;
+    if (found[i].lamp) light.lamp = lamps_by_period_[*found[i].lamp];
+    measure_stripes_in_outline(lines, background, light);
+    // Lamps with the same period differ in duty; without known periods a classifier decides.
+    if (!light.lamp) light.lamp = identify_lamp_by_stripes(light.stripes);
+    lights.push_back(std::move(light));
+  }
+  return lights;
+}
+
+void LightDetector::add_steady_lights(const ImageView& lines, const std::vector<Blob>& blobs,
+                                      const Background& background,
+                                      std::vector<MeasuredLight>& lights) const {
+  constexpr int min_px = 5, min_outline_px = 12;
+  constexpr double min_clipped = 0.5;
+  std::vector<MeasuredLight> added;
+  for (const Blob& blob : blobs) {
+    const PixelBox box = blob.blob_bounding_box();
+    if (std::min(box.width, box.height) < min_px) continue;
+    MeasuredLight light = make_light_without_outline(box, shape_);
+    const bool is_found = std::ranges::any_of(lights, [&](const Light& other) {
+      return other.box.contains(light.pixel) || are_at_same_position(other, light);
+    });
+    if (is_found) continue;
+    light.sigma_px = std::min(light.radius_px, kMaxSigma_px);
+    light.stripes = measure_stripes_in_box(lines, box, background);
+    const auto steady_reason = find_reason_for_steady_light(light.stripes);
+    light.kind = steady_reason ? LightKind::unmodulated : LightKind::unknown;
+    light.reason = steady_reason.value_or(LightReason::wrong_shape);
+    if (steady_reason == LightReason::unmodulated) {
+      if (compute_clipped_fraction(lines, {box.x, box.y}, {box.end_column(), box.end_row()}) >
+          min_clipped)
+        light.reason = LightReason::overexposed;
+    } else if (!steady_reason && (std::min(box.width, box.height) < min_outline_px ||
+                                  !is_box_inside_image(box, lines.size()))) {
+      light.kind = LightKind::no_outline;
+      light.reason = LightReason::incomplete;
+    } else if (!steady_reason) {
+      const auto lamp = identify_lamp_by_stripes(light.stripes);
+      const bool is_lamp_found = lamp && std::ranges::any_of(lights, [&](const Light& other) {
+                                   return other.lamp == lamp;
+                                 });
+      if (is_lamp_found) light.reason = LightReason::reflection;
+    }
+    added.push_back(std::move(light));
+  }
+  std::ranges::move(added, std::back_inserter(lights));
+}
+
+LightDetector::OutlineFits LightDetector::fit_outlines(const ImageView& lines,
+                                                       const std::vector<ModulatedLight>& found,
+                                                       const std::vector<Blob>& blobs,
+                                                       const Background& background) const {
   constexpr int num_passes = 3;
   constexpr double start_blur_px = 1;
-  std::vector<std::optional<Light>> rims(found.size());
-  std::optional<InverseHeight> before;
+  OutlineFits fits{std::vector<std::optional<MeasuredLight>>(found.size()), {}};
   for (int pass = 0; pass < num_passes; ++pass) {
     const bool is_last = pass + 1 == num_passes;
-    const auto inverse_height =
-        is_last ? estimate_inverse_height_from_radii(find_radii(found, rims))
-                : estimate_inverse_height(find_lamps_in_plane(found, rims, lamps));
-    if (pass > 0 && (!inverse_height || !(inverse_height->log_sd < before->log_sd))) continue;
-    before = inverse_height;
+    const auto inverse_height = is_last
+                                    ? estimate_inverse_height_from_radii(find_radii(found, fits))
+                                    : estimate_inverse_height(find_lamps_in_plane(found, fits));
+    const bool is_better = inverse_height && (!fits.inverse_height ||
+                                              inverse_height->log_sd < fits.inverse_height->log_sd);
+    if (pass > 0 && !is_better) continue;
+    fits.inverse_height = inverse_height;
     for (std::size_t i = 0; i < found.size(); ++i) {
-      const double period_lines = found[i].fit.period_lines;
+      auto& outline = fits.outlines[i];
       const auto radius = predict_radius(find_lamp_of_period(found[i]), inverse_height);
-      if (!rims[i] || (radius && !radius->agrees_with(*rims[i]))) {
-        const Blob blob = find_lit_pixels_of_light(found[i].box, blobs, lines.size());
-        if (blob.runs.empty()) continue;
-        rims[i] = fit_rim_of_light(lines, blob, period_lines, background, shape_, radius);
-      } else if (is_last && radius) {
-        const auto fit = fit_disc_outline(lines, rims[i]->plane_outline, start_blur_px,
-                                          period_lines, background, shape_, radius);
-        if (fit && set_fitted_outline(*fit, shape_, *rims[i]))
-          rims[i]->inlier_fraction = fit->inlier_fraction;
+      const bool is_disc = outline && outline->outline_kind != LightOutline::rectangle;
+      if (!outline || (is_disc && radius && !radius->agrees_with(*outline))) {
+        outline = fit_outline(lines, found[i], blobs, background, inverse_height);
+      } else if (is_last && is_disc && radius && radius->improves_fit(*outline)) {
+        const auto fit = fit_disc_outline(lines, outline->plane_outline, start_blur_px,
+                                          found[i].fit.period_lines, background, shape_, radius);
+        if (fit) set_fitted_outline(*fit, shape_, *outline);
       }
     }
     if (!inverse_height) break;  // without a lens, or with fewer than two lamps
   }
-  return {std::move(rims), before};
+  return fits;
 }
 
 std::vector<LampInPlane> LightDetector::find_lamps_in_plane(
-    const std::vector<ModulatedLight>& found, const std::vector<std::optional<Light>>& rims,
-    std::vector<LampInPlane> lamps) const {
+    const std::vector<ModulatedLight>& found, const OutlineFits& fits) const {
+  std::vector<LampInPlane> lamps;
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const auto lamp = make_lamp_in_plane(
-        find_lamp_of_period(found[i]),
-        rims[i] ? rims[i]->pixel : shape_.swap_image_and_scanline_axes(found[i].center),
-        rims[i] ? kRimCenterSd : kCentroidSd);
-    if (lamp) lamps.push_back(*lamp);
+    const Lamp* lamp = find_lamp_of_period(found[i]);
+    const auto& outline = fits.outlines[i];
+    const auto position = shape_.level_plane_point_from_pixel(
+        outline ? outline->pixel : shape_.swap_image_and_scanline_axes(found[i].center));
+    if (lamp == nullptr || !lamp->shape.size_m || !position || !shape_.has_known_lens()) continue;
+    lamps.push_back({*position, lamp->position_m.head<2>(),
+                     compute_height_beyond_first_lamp_m(*lamp),
+                     (outline ? kRimCenterSd : kCentroidSd) * lamp->shape.size_m->maxCoeff() / 2});
   }
   return lamps;
 }
 
-std::vector<LampRadius> LightDetector::find_radii(
-    const std::vector<ModulatedLight>& found, const std::vector<std::optional<Light>>& rims) const {
+std::vector<LampRadius> LightDetector::find_radii(const std::vector<ModulatedLight>& found,
+                                                  const OutlineFits& fits) const {
   std::vector<LampRadius> radii;
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Lamp* lamp = find_lamp_of_period(found[i]);
-    if (!rims[i] || lamp == nullptr || !lamp->shape.size_m || lamp->shape.kind != ShapeKind::disc)
+    const auto& outline = fits.outlines[i];
+    if (!outline || outline->outline_kind == LightOutline::rectangle || lamp == nullptr ||
+        !lamp->shape.size_m || lamp->shape.kind != ShapeKind::disc)
       continue;
-    radii.push_back({rims[i]->plane_outline.radius(), lamp->shape.size_m->x() / 2,
+    radii.push_back({outline->plane_outline.radius(), lamp->shape.size_m->x() / 2,
                      compute_height_beyond_first_lamp_m(*lamp)});
   }
   return radii;
@@ -478,17 +461,6 @@ std::optional<KnownRadius> LightDetector::predict_radius(
   return KnownRadius{radius, inverse_height->log_sd};
 }
 
-std::optional<LampInPlane> LightDetector::make_lamp_in_plane(const Lamp* lamp,
-                                                             const Eigen::Vector2d& pixel,
-                                                             double center_sd) const {
-  const auto position = shape_.level_plane_point_from_pixel(pixel);
-  if (lamp == nullptr || !lamp->shape.size_m || !position || !shape_.has_known_lens())
-    return std::nullopt;
-  return LampInPlane{*position, lamp->position_m.head<2>(),
-                     compute_height_beyond_first_lamp_m(*lamp),
-                     center_sd * lamp->shape.size_m->maxCoeff() / 2};
-}
-
 const Lamp* LightDetector::find_lamp_of_period(const ModulatedLight& found) const {
   const auto id = found.lamp ? lamps_by_period_[*found.lamp] : std::nullopt;
   return id ? find_lamp_by_id(lamps_.lamps, *id) : nullptr;
@@ -499,42 +471,43 @@ double LightDetector::compute_height_beyond_first_lamp_m(const Lamp& lamp) const
   return lamps_.lamps_below_camera ? -rise_m : rise_m;
 }
 
-void LightDetector::measure_stripes_and_fit_outline(const ImageView& lines,
-                                                    const Background& background,
-                                                    Light& light) const {
-  constexpr double max_start_blur_px = 3;
-  const auto find_chords = [&] {
-    const auto swap = [&](const auto& at) { return shape_.swap_image_and_scanline_axes(at); };
-    return is_light_disc_shaped(light)
-               ? find_chords_in_ellipse(swap(light.box_min), swap(light.box_max), lines.size())
-               : find_chords_in_polygon(swap(light.inner_polygon), lines.size());
-  };
-  if (is_light_disc_shaped(light)) {
-    const auto stripes =
-        measure_stripes(compute_scanline_signal(lines, find_chords(), background.level));
-    const auto fit = fit_disc_outline(lines, light.plane_outline,
-                                      std::min(light.rise_px / kRisePerBlur, max_start_blur_px),
-                                      stripes.period_lines, background, shape_);
-    if (fit) set_fitted_outline(*fit, shape_, light);
+Stripes LightDetector::measure_stripes_in_box(const ImageView& lines, const PixelBox& box,
+                                              const Background& background) const {
+  const auto chords =
+      find_chords_in_ellipse({box.x, box.y}, {box.end_column(), box.end_row()}, lines.size());
+  Stripes stripes = measure_stripes(compute_scanline_signal(lines, chords, background.level));
+  if (stripes.period_lines > 0) {
+    stripes.coherence =
+        compute_stripe_coherence_between_parts(lines, chords, background, stripes.period_lines);
   }
-  const auto chords = find_chords();
+  return stripes;
+}
+
+void LightDetector::measure_stripes_in_outline(const ImageView& lines, const Background& background,
+                                               MeasuredLight& light) const {
+  if (!has_outline(light)) return;
+  const auto swap = [&](const auto& at) { return shape_.swap_image_and_scanline_axes(at); };
+  const auto chords =
+      light.outline_kind == LightOutline::rectangle
+          ? find_chords_in_polygon(swap(light.inner_polygon), lines.size())
+          : find_chords_in_ellipse(swap(light.box.min()), swap(light.box.max()), lines.size());
   const auto signal = compute_scanline_signal(lines, chords, background.level);
-  light.stripes = measure_stripes(signal);
-  light.peak_level = signal.empty() ? 0 : *std::max_element(signal.begin(), signal.end());
-  if (light.stripes.period_lines > 0) {
-    light.coherence = compute_stripe_coherence_between_parts(lines, chords, background,
-                                                             light.stripes.period_lines);
-  }
-  if (light.stripes.contrast < kMinContrast) {
-    light.clipped_fraction =
-        clipped_fraction(lines, shape_.swap_image_and_scanline_axes(light.box_min),
-                         shape_.swap_image_and_scanline_axes(light.box_max));
-  }
+  Stripes stripes = measure_stripes(signal);
+  if (!are_stripes_readable(stripes)) return;
+  const auto lamp = identify_lamp_by_stripes(stripes);
+  if (light.lamp && !(lamp && has_clear_outline(light))) return;
+  stripes.coherence =
+      light.stripes.coherence > 0
+          ? light.stripes.coherence
+          : compute_stripe_coherence_between_parts(lines, chords, background, stripes.period_lines);
+  light.lamp = lamp;
+  light.stripes = stripes;
+  light.peak_level = *std::max_element(signal.begin(), signal.end());
 }
 
 void LightDetector::correct_light_centers_for_motion(const ImageView& lines,
                                                      const Background& background,
-                                                     std::vector<Light>& lights) const {
+                                                     std::vector<MeasuredLight>& lights) const {
   constexpr int num_passes = 2;  // the fit of a circle to a strongly sheared outline is inaccurate
   constexpr double start_blur_px = 0.5, rim_log_radius_sd = 0.02;
   std::vector<std::optional<Oval>> ovals(lights.size());
@@ -549,12 +522,12 @@ void LightDetector::correct_light_centers_for_motion(const ImageView& lines,
     const auto shear = Shear::estimate_shear_from_outlines(outlines);
     if (!shear) break;
     for (std::size_t i = 0; i < lights.size(); ++i) {
-      Light& light = lights[i];
+      MeasuredLight& light = lights[i];
       if (!light.outline_equations || !is_fitted[i]) continue;
       Oval oval = shear->predict_oval_from_motion(*light.outline_equations);
       const Eigen::Vector2d motion = shear->motion_per_scanline(*light.outline_equations);
       std::optional<KnownRadius> radius;
-      if (light.is_uneven) {
+      if (light.outline_kind == LightOutline::rim) {
         radius = {light.plane_outline.radius(), rim_log_radius_sd};
       }
       const auto fit = fit_disc_outline(
@@ -584,25 +557,20 @@ std::vector<Light> LightDetector::detect_lights(const ImageView& image) const {
   const auto& [lines, lit, memory] = scanlines;
   const auto blobs = group_pixel_runs_into_blobs(find_pixel_runs(lines, background.threshold, lit),
                                                  max_dark_rows_);
-  std::vector<LightPart> parts;
-  parts.reserve(blobs.size());
-  for (const Blob& blob : blobs) {
-    for (LightPart& part : find_light_parts(lines, blob, background))
-      parts.push_back(std::move(part));
-  }
-  std::vector<Light> lights = join_parts_of_one_light(parts, shape_, background);
-  for (Light& light : lights) measure_stripes_and_fit_outline(lines, background, light);
-  add_lights_found_by_modulation(lines, blobs, background, lights);
+  auto found = find_modulated_lights(lines, find_search_boxes(blobs, lines.size()), background,
+                                     lamp_periods_);
+  add_striped_blobs(lines, blobs, background, found);
+  OutlineFits fits = fit_outlines(lines, found, blobs, background);
+  const auto inverse_height = fits.inverse_height;
+  auto lights = measure_lights(lines, found, std::move(fits), background);
   correct_light_centers_for_motion(lines, background, lights);
-  for (Light& light : make_lights_without_outline(std::move(parts), lights, shape_, lines.size())) {
-    lights.push_back(std::move(light));
-  }
+  identify_lamps_of_lights(inverse_height, image.size(), lights);
+  add_steady_lights(lines, blobs, background, lights);
+  if (!shape_.has_known_lens()) add_error_of_unknown_lens(image.size(), lights);
   std::sort(lights.begin(), lights.end(), [](const Light& a, const Light& b) {
     return a.pixel.y() != b.pixel.y() ? a.pixel.y() < b.pixel.y() : a.pixel.x() < b.pixel.x();
   });
-  identify_lamps_of_lights(lights, image.size());
-  if (!shape_.has_known_lens()) add_error_of_unknown_lens(image.size(), lights);
-  return lights;
+  return {lights.begin(), lights.end()};
 }
 
 namespace {
@@ -618,14 +586,14 @@ void reject(Light& light, LightReason reason) {
 /// three such lights are required. Other periods may differ by kMaxUnclearDrift from those of their
 /// lamps.
 void reject_contradicting_periods(const LampMap& lamps, double row_time_s,
-                                  std::vector<Light>& lights) {
+                                  std::vector<MeasuredLight>& lights) {
   constexpr std::size_t min_lights = 3;
   const auto has_clear_period = [](const Light& light) {
-    return !light.is_found_by_modulation && are_stripes_reliable(light.stripes);
+    return has_clear_outline(light) && are_stripes_reliable(light.stripes);
   };
-  std::vector<std::pair<Light*, double>> log_values;
+  std::vector<std::pair<MeasuredLight*, double>> log_values;
   std::vector<double> clear_ones;
-  for (Light& light : lights) {
+  for (MeasuredLight& light : lights) {
     const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps.lamps, *light.lamp) : nullptr;
     if (lamp == nullptr || !lamp->frequency_hz) continue;
     const double log_value =
@@ -641,37 +609,39 @@ void reject_contradicting_periods(const LampMap& lamps, double row_time_s,
   }
 }
 
-/// Keeps one of the lights that are identified as the same lamp; the others are mirror images. A
-/// light with an outline takes precedence over one without. Among lights with an outline the one
-/// with the smallest sigma is kept, among lights without the largest one. Rejects all if two of
-/// them have similar size and brightness. A mirror reflects less than all light, and lenses darken
-/// the corners of an image.
-void keep_best_light_of_lamp(int lamp, std::vector<Light>& lights) {
+/// Keeps one of the lights that are identified as the same lamp; the others are mirror images.
+/// Prefers lights with an outline, of these the one with the smallest sigma; without an outline the
+/// largest light. Rejects all if two of them have similar size and brightness. A mirror reflects
+/// less than all light, and lenses darken the corners of an image.
+void keep_best_light_of_lamp(int lamp, std::vector<MeasuredLight>& lights) {
   constexpr double min_area_ratio = 2, min_peak_ratio = 2;
-  std::vector<Light*> claims;
-  for (Light& light : lights) {
+  std::vector<MeasuredLight*> claims;
+  for (MeasuredLight& light : lights) {
     if (light.lamp == lamp) claims.push_back(&light);
   }
   if (claims.size() < 2) return;
-  std::sort(claims.begin(), claims.end(), [](const Light* a, const Light* b) {
-    if (a->is_glow != b->is_glow) return b->is_glow;
-    return a->is_glow ? a->radius_px > b->radius_px : a->sigma_px < b->sigma_px;
+  const auto outlines_end = std::partition(
+      claims.begin(), claims.end(), [](const MeasuredLight* claim) { return has_outline(*claim); });
+  std::sort(claims.begin(), outlines_end, [](const MeasuredLight* a, const MeasuredLight* b) {
+    return a->sigma_px < b->sigma_px;
   });
-  const double ratio = std::pow(claims[0]->radius_px / claims[1]->radius_px, 2);
-  const bool is_apart =
-      (claims[0]->pixel - claims[1]->pixel).norm() > claims[0]->radius_px + claims[1]->radius_px;
-  const bool are_alike = claims[0]->is_glow == claims[1]->is_glow;
-  bool is_clear = !are_alike || ratio > min_area_ratio ||
-                  (!claims[0]->is_glow && (!is_apart || 1 / ratio > min_area_ratio));
+  std::sort(outlines_end, claims.end(), [](const MeasuredLight* a, const MeasuredLight* b) {
+    return a->radius_px > b->radius_px;
+  });
+  const auto alike_end = outlines_end == claims.begin() ? claims.end() : outlines_end;
+  bool is_clear = claims.begin() + 1 == alike_end;
   if (!is_clear) {
-    const auto alike_end = std::find_if(claims.begin(), claims.end(), [&](const Light* claim) {
-      return claim->is_glow != claims[0]->is_glow;
+    const double ratio = std::pow(claims[0]->radius_px / claims[1]->radius_px, 2);
+    const bool is_apart =
+        (claims[0]->pixel - claims[1]->pixel).norm() > claims[0]->radius_px + claims[1]->radius_px;
+    is_clear = ratio > min_area_ratio ||
+               (has_outline(*claims[0]) && (!is_apart || 1 / ratio > min_area_ratio));
+  }
+  if (!is_clear) {
+    std::sort(claims.begin(), alike_end, [](const MeasuredLight* a, const MeasuredLight* b) {
+      return a->peak_level > b->peak_level;
     });
-    std::sort(claims.begin(), alike_end,
-              [](const Light* a, const Light* b) { return a->peak_level > b->peak_level; });
-    // The level of scanlines and the amplitude of cells are not comparable.
-    is_clear = claims[0]->is_found_by_modulation == claims[1]->is_found_by_modulation &&
-               claims[0]->peak_level > min_peak_ratio * claims[1]->peak_level;
+    is_clear = claims[0]->peak_level > min_peak_ratio * claims[1]->peak_level;
   }
   for (std::size_t i = is_clear ? 1 : 0; i < claims.size(); ++i) {
     reject(*claims[i], LightReason::reflection);
@@ -681,8 +651,8 @@ void keep_best_light_of_lamp(int lamp, std::vector<Light>& lights) {
 }  // namespace
 
 bool is_light_fully_in_view(const Light& light, const ImageSize& size) {
-  return light.box_min.minCoeff() > -0.5 && light.box_max.x() < size.width - 0.5 &&
-         light.box_max.y() < size.height - 0.5;
+  return light.box.min().minCoeff() > -0.5 && light.box.max().x() < size.width - 0.5 &&
+         light.box.max().y() < size.height - 0.5;
 }
 
 std::optional<int> LightDetector::identify_lamp_by_stripes(const Stripes& stripes) const {
@@ -691,36 +661,80 @@ std::optional<int> LightDetector::identify_lamp_by_stripes(const Stripes& stripe
   return identify_lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
 }
 
-std::optional<double> LightDetector::compute_log_aspect_ratio_difference(const Light& light,
+std::optional<double> LightDetector::compute_log_aspect_ratio_difference(const MeasuredLight& light,
                                                                          int lamp) const {
   // An unknown lens changes the aspect ratio by more than an unknown tilt.
   const double max_off = shape_.has_known_lens() ? 2 * kUnknownTiltSd : 0.3;
   const Lamp* mapped = find_lamp_by_id(lamps_.lamps, lamp);  // a classifier may have other lamps
   const LampShape shape = mapped != nullptr ? mapped->shape : LampShape();
-  if (shape.kind != light.shape) return std::nullopt;
+  if ((shape.kind == ShapeKind::rectangle) != (light.outline_kind == LightOutline::rectangle))
+    return std::nullopt;
   const double aspect = shape.size_m ? shape.size_m->maxCoeff() / shape.size_m->minCoeff() : 1;
   const double off = std::abs(std::log(light.aspect / aspect));
   return off < max_off ? std::optional(off) : std::nullopt;
 }
 
-void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
-                                             const ImageSize& size) const {
+void LightDetector::reject_lights_of_other_size(const std::optional<InverseHeight>& inverse_height,
+                                                std::vector<MeasuredLight>& lights) const {
+  constexpr double max_outline_off = 0.1, max_sds = 4, max_centroid_off = 0.35;
+  constexpr int min_lamps = 3;
+  struct Size {
+    MeasuredLight* light;
+    double log_ratio;
+  };
+  std::vector<Size> sizes;
+  int num_agreeing = 0, num_even = 0;
+  for (MeasuredLight& light : lights) {
+    const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps_.lamps, *light.lamp) : nullptr;
+    const auto radius = predict_radius(lamp, inverse_height);
+    const auto measured = measure_radius_in_plane(light);
+    if (!radius || !measured) continue;
+    sizes.push_back({&light, std::log(*measured / radius->radius)});
+    if (!has_outline(light) || std::abs(sizes.back().log_ratio) > max_outline_off) continue;
+    ++num_agreeing;
+    num_even += light.outline_kind == LightOutline::edge ? 1 : 0;
+  }
+  if (num_agreeing < min_lamps) return;
+  const double max_off = std::max(max_outline_off, max_sds * inverse_height->log_sd);
+  const bool are_even = 2 * num_even > num_agreeing;
+  for (const auto& [light, log_ratio] : sizes) {
+    const bool is_other = has_outline(*light) ? std::abs(log_ratio) > max_off
+                          : are_even          ? std::abs(log_ratio) > max_centroid_off
+                                              : log_ratio > max_centroid_off;
+    if (is_other) {
+      reject(*light, LightReason::reflection);
+    } else if (!has_outline(*light) && are_even && light->stripes.periods < kMinReliablePeriods) {
+      reject(*light, LightReason::too_few_periods);
+    }
+  }
+}
+
+std::optional<double> LightDetector::measure_radius_in_plane(const MeasuredLight& light) const {
+  if (light.outline_kind == LightOutline::rectangle) return std::nullopt;
+  if (has_outline(light)) return light.plane_outline.radius();
+  const Eigen::Vector2d half(light.radius_px, 0);
+  const auto before = shape_.level_plane_point_from_pixel(light.pixel - half),
+             after = shape_.level_plane_point_from_pixel(light.pixel + half);
+  if (!before || !after) return std::nullopt;
+  return (*after - *before).norm() / 2;
+}
+
+void LightDetector::identify_lamps_of_lights(const std::optional<InverseHeight>& inverse_height,
+                                             const ImageSize& size,
+                                             std::vector<MeasuredLight>& lights) const {
   // A surface that blurs the image of a lamp reflects less than 5 % of its light in one direction.
   // A tone curve of gamma 2.2 displays this as a quarter of the level.
   constexpr double min_peak_ratio = 0.25;
-  constexpr double max_rise_ratio = 3, min_rise_px = 1, max_outside = 0.25;
+  constexpr double max_rise_ratio = 3, min_rise_px = 1;
   double sharpest_px = std::numeric_limits<double>::infinity(), brightest = 0;
-  for (Light& light : lights) {
-    if (light.kind == LightKind::no_outline) continue;
-    const auto steady = find_reason_for_steady_light(light);
+  for (MeasuredLight& light : lights) {
+    const auto steady = find_reason_for_steady_light(light.stripes);
     light.kind = steady ? LightKind::unmodulated : LightKind::unknown;
-    light.reason = steady.value_or(LightReason::unknown_period);
     if (steady) {
-      light.lamp.reset();
+      reject(light, *steady);
       continue;
     }
-    if (!light.is_glow) sharpest_px = std::min(sharpest_px, light.rise_px);
-    if (!light.is_found_by_modulation) light.lamp = identify_lamp_by_stripes(light.stripes);
+    if (has_outline(light)) sharpest_px = std::min(sharpest_px, light.rise_px);
     if (!are_stripes_readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
     const auto off = compute_log_aspect_ratio_difference(light, *light.lamp);
@@ -730,31 +744,30 @@ void LightDetector::identify_lamps_of_lights(std::vector<Light>& lights,
       add_hidden_end_error_to_center_sigma(*off, shape_.is_camera_tilted() ? 0 : kUnknownTiltSd,
                                            light);
     }
-    if (light.lamp && !light.is_glow) brightest = std::max(brightest, light.peak_level);
+    if (light.lamp && has_outline(light)) brightest = std::max(brightest, light.peak_level);
   }
-  for (Light& light : lights) {
+  for (MeasuredLight& light : lights) {
     if (!light.lamp) continue;
-    // The reflection of a lamp is modulated like the lamp. If too many edge points are not on the
-    // lamp's outline, a circle through the others is not reliable.
-    const bool has_other_outline = light.outside_ratio > max_outside;
-    const bool is_soft = light.is_glow
-                             ? light.peak_level < min_peak_ratio * brightest
-                             : light.rise_px > max_rise_ratio * std::max(sharpest_px, min_rise_px);
+    // The reflection of a lamp is modulated like the lamp.
+    const bool is_soft = has_outline(light)
+                             ? light.rise_px > max_rise_ratio * std::max(sharpest_px, min_rise_px)
+                             : light.peak_level < min_peak_ratio * brightest;
     if (is_soft) {
       reject(light, LightReason::reflection);
-    } else if (has_other_outline || light.inlier_fraction < kMinInlierFraction) {
+    } else if (light.inlier_fraction < kMinInlierFraction) {
       reject(light, LightReason::wrong_shape);
     }
   }
+  reject_lights_of_other_size(inverse_height, lights);
   // A classifier does not use the frequencies of the map.
   if (camera_.row_time_s && !classifier_) {
     reject_contradicting_periods(lamps_, *camera_.row_time_s, lights);
   }
   for (const Lamp& lamp : lamps_.lamps) keep_best_light_of_lamp(lamp.id, lights);
-  const bool sure = std::any_of(lights.begin(), lights.end(), [](const Light& light) {
+  const bool sure = std::ranges::any_of(lights, [](const Light& light) {
     return light.lamp && light.stripes.periods >= kMinReliablePeriods;
   });
-  for (Light& light : lights) {
+  for (MeasuredLight& light : lights) {
     if (light.lamp && !sure) reject(light, LightReason::too_few_periods);
     if (!light.lamp) continue;
     light.kind = is_light_fully_in_view(light, size) ? LightKind::lamp : LightKind::truncated;

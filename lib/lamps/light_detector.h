@@ -3,18 +3,18 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <map>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "lamps/image/background.h"
 #include "lamps/image/image_view.h"
 #include "lamps/image/pixel_box.h"
+#include "lamps/image/pixel_runs.h"
 #include "lamps/shape/inverse_height.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_center.h"
-#include "lamps/shape/light_parts.h"
-#include "lamps/shape/rim.h"
+#include "lamps/shape/outline_fit.h"
 #include "lamps/signal/lamp_classifier.h"
 #include "lamps/signal/modulated_lights.h"
 #include "rig/calibration.h"
@@ -37,11 +37,11 @@ DetectorCamera make_detector_camera(const Calibration& calibration);
 /// Detects and identifies the lamps of a map in images of a rolling-shutter camera. All methods are
 /// const and thread-safe.
 ///
-/// Center: from a fit of the outline to the levels near it, see fit_disc_outline(); LightShape
-/// gives the first outline. Other shapes than discs are searched if the map has them, see
-/// ShapeDetector. Where no light with a clear outline is identified, lights are detected by their
-/// modulation, whatever their shape, see find_modulated_lights(). Their center is that of their
-/// rim, see fit_rim_of_light(). Without a rim it is the centroid of the lit area.
+/// Search: lights are found by their modulation, whatever their shape, see find_modulated_lights(),
+/// and as lit areas with stripes.
+///
+/// Center: from a fit of the outline to the levels near it, see fit_rim_of_light() and
+/// fit_rectangular_light(). Without an outline it is the centroid of the lit area.
 ///
 /// Identity: a lamp of frequency f has stripes with a period of 1 / (f row_time) scanlines (Chen
 /// and Guan, section 2.1). With a trained classifier the classifier decides.
@@ -64,55 +64,70 @@ class LightDetector {
   Readout readout_direction() const { return camera_.readout; }
 
  private:
-  /// Fits outlines to a blob: one, or several if lights touch. Sets Light::is_doubtful.
-  std::vector<LightPart> find_light_parts(const ImageView& lines, const Blob& blob,
-                                          const Background& background) const;
-  /// Searches for modulated lights in blobs without an identified light that has a clear outline.
-  /// Replaces the lights at the position of each modulated light.
-  void add_lights_found_by_modulation(const ImageView& lines, const std::vector<Blob>& blobs,
-                                      const Background& background,
-                                      std::vector<Light>& lights) const;
-  /// Rims of lights, and the inverse height from the distances between identified lamps.
-  struct RimFits {
-    std::vector<std::optional<Light>> rims;
+  /// Outlines of modulated lights, and the inverse height from them.
+  struct OutlineFits {
+    std::vector<std::optional<MeasuredLight>> outlines;
     std::optional<InverseHeight> inverse_height;
   };
-  /// Fits the rims of modulated lights. Distances between identified lamps determine the height of
-  /// the camera, and thereby the radii of the rims. The distances between the centers of rims
-  /// determine the height more accurately; rims of another radius are then searched again. The
-  /// median of the radii is still more accurate: all rims are then fitted with this radius.
-  /// @param lamps  identified lights with a clear outline
-  RimFits fit_rims(const ImageView& lines, const std::vector<ModulatedLight>& found,
-                   const std::vector<Blob>& blobs, const Background& background,
-                   const std::vector<LampInPlane>& lamps) const;
-  /// Adds the lamps of modulated lights to `lamps`, with the centers of their rims if known.
+  /// Returns the parts of the image to be searched for lights.
+  std::vector<PixelBox> find_search_boxes(const std::vector<Blob>& blobs,
+                                          const ImageSize& size) const;
+  /// Adds blobs with stripes in which no modulated light was found: lights with few periods, or
+  /// that touch others.
+  void add_striped_blobs(const ImageView& lines, const std::vector<Blob>& blobs,
+                         const Background& background, std::vector<ModulatedLight>& found) const;
+  /// Fits the outlines of modulated lights. Distances between identified lamps determine the height
+  /// of the camera, and thereby the radii of the lamps. The distances between the centers of
+  /// outlines determine the height more accurately; outlines of another radius are then searched
+  /// again. The median of the radii is still more accurate: all discs are then fitted with it.
+  OutlineFits fit_outlines(const ImageView& lines, const std::vector<ModulatedLight>& found,
+                           const std::vector<Blob>& blobs, const Background& background) const;
+  /// Fits a rectangle if the lamp may be one, or else a disc.
+  std::optional<MeasuredLight> fit_outline(
+      const ImageView& lines, const ModulatedLight& found, const std::vector<Blob>& blobs,
+      const Background& background, const std::optional<InverseHeight>& inverse_height) const;
+  /// Makes lights of modulated lights and their outlines, measures their stripes, and sets the lamp
+  /// with these stripes.
+  std::vector<MeasuredLight> measure_lights(const ImageView& lines,
+                                            const std::vector<ModulatedLight>& found,
+                                            OutlineFits fits, const Background& background) const;
+  /// Adds the blobs in which no light was found.
+  void add_steady_lights(const ImageView& lines, const std::vector<Blob>& blobs,
+                         const Background& background, std::vector<MeasuredLight>& lights) const;
+  /// Returns the lamps of modulated lights, with the centers of their outlines if known.
   std::vector<LampInPlane> find_lamps_in_plane(const std::vector<ModulatedLight>& found,
-                                               const std::vector<std::optional<Light>>& rims,
-                                               std::vector<LampInPlane> lamps) const;
-  /// Returns the radii of the rims of lamps of known size.
+                                               const OutlineFits& fits) const;
+  /// Returns the radii of discs of known size.
   std::vector<LampRadius> find_radii(const std::vector<ModulatedLight>& found,
-                                     const std::vector<std::optional<Light>>& rims) const;
+                                     const OutlineFits& fits) const;
   /// Returns the radius of a lamp in the level plane; std::nullopt if it is no disc of known size,
   /// or if the height is unknown.
   std::optional<KnownRadius> predict_radius(
       const Lamp* lamp, const std::optional<InverseHeight>& inverse_height) const;
-  /// Returns a lamp whose light is at `pixel`; std::nullopt if its size or the lens is unknown.
-  /// @param center_sd  standard deviation of the center per axis, in radii
-  std::optional<LampInPlane> make_lamp_in_plane(const Lamp* lamp, const Eigen::Vector2d& pixel,
-                                                double center_sd) const;
   /// Returns the lamp with the period of a modulated light; nullptr if there is none or several.
   const Lamp* find_lamp_of_period(const ModulatedLight& found) const;
   double compute_height_beyond_first_lamp_m(const Lamp& lamp) const;
-  /// Measures the stripes of a light and fits its outline.
-  void measure_stripes_and_fit_outline(const ImageView& lines, const Background& background,
-                                       Light& light) const;
+  /// Measures the stripes in the ellipse in a box.
+  Stripes measure_stripes_in_box(const ImageView& lines, const PixelBox& box,
+                                 const Background& background) const;
+  /// Measures the stripes of a light within its outline. Keeps those of the modulated light if they
+  /// belong to a lamp and the outline is not clear.
+  void measure_stripes_in_outline(const ImageView& lines, const Background& background,
+                                  MeasuredLight& light) const;
   /// Fits the outlines of discs again, twice, sheared by the camera motion that Shear estimates.
   void correct_light_centers_for_motion(const ImageView& lines, const Background& background,
-                                        std::vector<Light>& lights) const;
-  void identify_lamps_of_lights(std::vector<Light>& lights, const ImageSize& size) const;
+                                        std::vector<MeasuredLight>& lights) const;
+  void identify_lamps_of_lights(const std::optional<InverseHeight>& inverse_height,
+                                const ImageSize& size, std::vector<MeasuredLight>& lights) const;
+  /// Rejects lights whose radius differs from that of their lamp, if at least three others agree.
+  void reject_lights_of_other_size(const std::optional<InverseHeight>& inverse_height,
+                                   std::vector<MeasuredLight>& lights) const;
+  /// Returns the radius of a light in the level plane; std::nullopt for rectangles.
+  std::optional<double> measure_radius_in_plane(const MeasuredLight& light) const;
   /// Returns the absolute difference between the log aspect ratios of a light and a lamp. Returns
   /// std::nullopt if the light has another shape or the difference exceeds its limit.
-  std::optional<double> compute_log_aspect_ratio_difference(const Light& light, int lamp) const;
+  std::optional<double> compute_log_aspect_ratio_difference(const MeasuredLight& light,
+                                                            int lamp) const;
   /// Returns the id of the lamp with these stripes; std::nullopt if no lamp or several lamps agree.
   std::optional<int> identify_lamp_by_stripes(const Stripes& stripes) const;
 
@@ -121,8 +136,8 @@ class LightDetector {
   LightShape shape_;
   std::optional<LampClassifier> classifier_;
   int max_dark_rows_;
-  /// Lengths of both axes of the map's lamps, by shape.
-  std::map<ShapeKind, std::vector<Eigen::Vector2d>> sizes_m_;
+  /// Lengths of both axes of the map's rectangles.
+  std::vector<Eigen::Vector2d> rectangle_sizes_m_;
   /// Distinct periods of the map's lamps, in scanlines, and the lamp of each period. The lamp is
   /// std::nullopt if several lamps share the period. Empty if the row time is unknown or a
   /// classifier decides.

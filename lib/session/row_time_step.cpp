@@ -60,15 +60,14 @@ struct PeriodsOfImages {
 constexpr int kMinRowTimeLamps = 3;
 constexpr double kMicrosecondsPerSecond = 1e6;
 
-/// Collects the periods of identified lamps. A period found by modulation is excluded: its search
-/// begins at the given row time.
+/// Collects the periods of identified lamps.
 std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>& images) {
   std::vector<MeasuredPeriod> periods;
   for (const Observation& image : images) {
     if (!image.is_image_kept()) continue;  // excludes copies and images of another camera
     for (const Light& light : image.lights) {
-      const bool is_measured = light.kind == LightKind::lamp && light.lamp &&
-                               !light.is_found_by_modulation && are_stripes_reliable(light.stripes);
+      const bool is_measured =
+          light.kind == LightKind::lamp && light.lamp && are_stripes_reliable(light.stripes);
       if (!is_measured) continue;
       periods.push_back({light.stripes.period_lines, light.lamp});
     }

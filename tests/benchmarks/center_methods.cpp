@@ -60,10 +60,10 @@ LitPixels find_lit_pixels(const cv::Mat& image, const Background& background, co
 
 LitPixels find_lit_pixels(const cv::Mat& image, const Light& light) {
   constexpr int around_px = 4;
-  const cv::Point low(int(std::floor(light.box_min.x())) - around_px,
-                      int(std::floor(light.box_min.y())) - around_px);
-  const cv::Point high(int(std::ceil(light.box_max.x())) + around_px + 1,
-                       int(std::ceil(light.box_max.y())) + around_px + 1);
+  const cv::Point low(int(std::floor(light.box.min().x())) - around_px,
+                      int(std::floor(light.box.min().y())) - around_px);
+  const cv::Point high(int(std::ceil(light.box.max().x())) + around_px + 1,
+                       int(std::ceil(light.box.max().y())) + around_px + 1);
   const cv::Rect box = cv::Rect(low, high) & cv::Rect({0, 0}, image.size());
   const Background background = estimate_image_background(to_image_view(image));
   return image.depth() == CV_8U ? find_lit_pixels<std::uint8_t>(image, background, box)

@@ -43,6 +43,7 @@ Observation image_with(const char* name, std::vector<Light> lights) {
 TEST(WriteLightsTable, WritesOneRowPerLight) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
+  lamp.outline_kind = LightOutline::edge;
   Light steady = light_of_kind(LightKind::unmodulated, LightReason::overexposed);
   steady.stripes = {};
   const Light formless = light_of_kind(LightKind::no_outline, LightReason::incomplete);
@@ -139,22 +140,27 @@ TEST(LightDetector, ReportsOverexposedForClippedAndSteadyForUnmodulatedLamp) {
   }
 }
 
-TEST(LightDetector, ReportsIncompleteOrWrongShapeForLightsWithoutOutline) {
+TEST(LightDetector, ReportsIncompleteForSmallLightAndTooFewPeriodsForCutOne) {
+  const auto small = lights_in_drawing(drawn_lamp_at({150.3, 99.6}, 4, 0.7, {.period_lines = 4}));
+  ASSERT_EQ(small.size(), 1U);
+  EXPECT_EQ(small[0].kind, LightKind::no_outline);
+  EXPECT_EQ(light_reason_name(small[0].reason), light_reason_name(LightReason::incomplete));
+  const auto cut = lights_in_drawing(drawn_lamp_at({150.3, -30.6}, 38));
+  ASSERT_EQ(cut.size(), 1U);
+  EXPECT_EQ(light_reason_name(cut[0].reason), light_reason_name(LightReason::too_few_periods));
+  for (const Light& light : {small[0], cut[0]}) {
+    EXPECT_FALSE(light.lamp);
+    EXPECT_FALSE(is_light_modulated(light));
+  }
+}
+
+TEST(LightDetector, ReportsCrossAsSteady) {
   cv::Mat cross(kReasonSize, CV_8U, cv::Scalar(10));
   cv::rectangle(cross, {50, 95, 200, 8}, 200, cv::FILLED);
   cv::rectangle(cross, {146, 20, 8, 160}, 200, cv::FILLED);
-  for (const auto& [image, reason] :
-       {std::pair(drawn_lamp_at({150.3, 99.6}, 4, 0.7, {.period_lines = 4}),
-                  LightReason::incomplete),
-        {drawn_lamp_at({150.3, -30.6}, 38), LightReason::incomplete},
-        {cross, LightReason::wrong_shape}}) {
-    const auto lights = lights_in_drawing(image);
-    ASSERT_EQ(lights.size(), 1U) << light_reason_name(reason);
-    EXPECT_EQ(lights[0].kind, LightKind::no_outline);
-    EXPECT_EQ(light_reason_name(lights[0].reason), light_reason_name(reason));
-    EXPECT_FALSE(lights[0].lamp);
-    EXPECT_FALSE(is_light_modulated(lights[0]));
-  }
+  const auto lights = lights_in_drawing(cross);
+  ASSERT_EQ(lights.size(), 1U);
+  EXPECT_EQ(lights[0].kind, LightKind::unmodulated);
 }
 
 }  // namespace

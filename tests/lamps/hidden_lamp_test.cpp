@@ -43,7 +43,7 @@ Tally tally(double width_of_diameter) {
         SCOPED_TRACE(testing::Message() << "bar at " << degrees << " deg, " << offset
                                         << " off, as wide as " << width_of_diameter);
         EXPECT_EQ(*light.lamp, id);
-        EXPECT_LT((light.pixel - lamp.center).norm(), light.is_glow ? 2 * light.sigma_px : 1);
+        EXPECT_LT((light.pixel - lamp.center).norm(), !has_outline(light) ? 2 * light.sigma_px : 1);
         ++tally.found;
       }
     }

@@ -82,7 +82,7 @@ Identified identified(const fs::path& data, const ImageProcessing& picture) {
     const double apart_px = (lamp->second.pixel - expected).norm();
     ++result.lamps;
     result.wrong += apart_px > std::max(table.get_cell_number(row, size_column) / 2,
-                                        lamp->second.is_glow ? 0 : lamp->second.radius_px);
+                                        !has_outline(lamp->second) ? 0 : lamp->second.radius_px);
   }
   return result;
 }
@@ -152,7 +152,7 @@ TEST(LightDetectorOnRealObliqueDownlights, LocatesRimsWithoutLens) {
         std::tuple("e608.jpg", 2, 508.0, 878.0)}) {
     const auto lamps = lamps_in(detector, read_image(data / name));
     ASSERT_TRUE(lamps.contains(lamp)) << name << lamp;
-    if (lamps.at(lamp).is_glow) continue;
+    if (!has_outline(lamps.at(lamp))) continue;
     ++num_rims;
     EXPECT_LT((lamps.at(lamp).pixel - Eigen::Vector2d(u_px, v_px)).norm(), accuracy_px)
         << name << lamp;

@@ -58,7 +58,7 @@ TEST(PositionerOnRealGlows, ComputesTrueDistanceWithinTwoCentimetersFromFiveLamp
   const ImageDetections result = detect_lamps_in(folder, "x_0_y_1.27.jpg", Readout::rows);
   std::vector<Detection> detections;
   for (const auto& [id, light] : result.lamps) {
-    EXPECT_TRUE(light.is_glow);
+    EXPECT_FALSE(has_outline(light));
     detections.push_back({id, light.pixel, light.sigma_px});
   }
   ASSERT_EQ(detections.size(), 5U);

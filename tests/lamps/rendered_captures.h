@@ -44,7 +44,7 @@ class Captures {
         set_(*std::find_if(scene_.sets.begin(), scene_.sets.end(),
                            [&](const CaptureSet& set) { return set.folder == folder; })) {}
 
-  /// Error of a center above which a lamp counts as wrong.
+  /// Error of a center above which, and above its sigma, a lamp counts as wrong.
   double max_error_px = 5;
 
   LampShot shot(std::size_t index) const {
@@ -101,8 +101,9 @@ class Captures {
       const double error_px = (light->second.pixel - pixel).norm();
       const double sigma_px = light->second.sigma_px;
       found.erase(light);
-      if (error_px > max_error_px) ++score.wrong;
-      if (error_px > max_error_px || !counts(id)) continue;
+      const bool is_wrong = error_px > std::max(max_error_px, sigma_px);
+      if (is_wrong) ++score.wrong;
+      if (is_wrong || !counts(id)) continue;
       const double chi_square = error_px * error_px / 2 / std::pow(sigma_px, 2);
       if (in_view < 1) {
         ++score.hidden;

@@ -161,7 +161,7 @@ TEST_F(VlpDetect, LightsTableListsKindAndReasonOfEachLight) {
   EXPECT_EQ(kinds["unknown"], 1U) << "the reflection of lamp 5";
   EXPECT_THAT(found.output,
               HasSubstr("1         unknown, reflection: it is more blurred than the lamps"));
-  EXPECT_THAT(found.errors, HasSubstr(") lamp 5: its stripes match this lamp; radius 28.4 px"));
+  EXPECT_THAT(found.errors, HasSubstr(") lamp 5: its stripes match this lamp; radius 28.5 px"));
 }
 
 TEST_F(VlpDetect, WritesLightsTableEvenIfNoLampIsFound) {

@@ -96,7 +96,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, RenderedSamples,
 
 INSTANTIATE_TEST_SUITE_P(Scenes, RenderedSamplesOfDiscs,
                          testing::Values(Sample{"paper-rig", 0.038},
-                                         Sample{"paper-rig-faulty", 0.33}, Sample{"clutter", 0.08},
+                                         Sample{"paper-rig-faulty", 0.33}, Sample{"clutter", 0.085},
                                          Sample{"wide", 0.048}),
                          [](const auto& instance) { return test_name(instance.param.scene); });
 

@@ -47,8 +47,7 @@ Observation observe(const LampMap& map, const std::vector<double>& deviations, b
     light.stripes.is_regular = true;
     light.pixel = {100 + 120.0 * static_cast<double>(i), 300};
     light.sigma_px = 0.1;
-    light.box_min = light.pixel - Eigen::Vector2d(40, 40);
-    light.box_max = light.pixel + Eigen::Vector2d(40, 40);
+    light.box = {light.pixel - Eigen::Vector2d(40, 40), light.pixel + Eigen::Vector2d(40, 40)};
     image.lights.push_back(light);
   }
   return image;

@@ -29,27 +29,17 @@ struct DetectorCamera {
   double max_axis_ratio = 2;
 };
 
-/// Fits the first outlines of lights, see fit_disc_outline() for the final ones. Edge points are
-/// projected through the lens into the level plane, where a circle is fitted robustly. The center
-/// of the circle is projected back to the image. Reason: the center of an outline in the image is
-/// not the image of the center (lib/THEORY.md, "Lamp centroid"). Without a lens an ellipse is
-/// fitted in the image.
+/// Plane in which the outlines of lights are fitted: the level plane at height 1, seen through the
+/// lens, in which discs are circles; without a lens the image. Reason: the center of an outline in
+/// the image is not the image of the center (lib/THEORY.md, "Lamp centroid").
 class LightShape {
  public:
   explicit LightShape(const DetectorCamera& camera) : camera_(camera) {}
 
-  /// Fits a light to the majority of the points of an outline. Sets center, sigma_px, outline, box,
-  /// radius, rise_px and inlier_fraction. Returns std::nullopt if the outline is not round, or if
-  /// the sigma of its center exceeds kMaxSigma_px.
-  ///
-  /// @param outline     edge points, (column, line)
-  /// @param background  dark level and noise of the image
-  std::optional<Light> fit_light_to_outline(std::vector<EdgePoint> outline,
-                                            const Background& background) const;
-
   /// Sets center, outline, bounding box and radius of a light. Returns false, and changes nothing,
   /// if the lens does not cover its rim.
-  bool set_outline_of_light(const PlaneEllipse& outline, double radius_px, Light& light) const;
+  bool set_outline_of_light(const PlaneEllipse& outline, double radius_px,
+                            MeasuredLight& light) const;
 
   /// Corrects center and sigma_px of a light for camera motion. @pre light.outline_equations has a
   /// value.
@@ -57,11 +47,7 @@ class LightShape {
   /// @param oval             prior of the ovality, relative to the fitted outline, in radii
   /// @param motion_per_line  motion of the light in the level plane per scanline
   void correct_light_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
-                                Light& light) const;
-
-  /// Returns the outline points outside a light, beyond a margin of 10 % and 1.5 px.
-  std::vector<EdgePoint> find_outline_points_outside_light(
-      const Light& light, const std::vector<EdgePoint>& outline) const;
+                                MeasuredLight& light) const;
 
   /// Converts (u, v) of the image to (column, line), and back.
   Eigen::Vector2d swap_image_and_scanline_axes(const Eigen::Vector2d& at) const;

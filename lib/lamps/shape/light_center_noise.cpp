@@ -22,7 +22,7 @@ void add_error_to_center_sigma(double sd_px, Light& light) {
   light.sigma_px = std::min(std::hypot(light.sigma_px, sd_px), kMaxSigma_px);
 }
 
-void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, Light& light) {
+void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, MeasuredLight& light) {
   constexpr double clear = 3;
   if (!(off > tilt_sd + clear * light.aspect_sd)) return;
   const double length_px =
@@ -32,7 +32,7 @@ void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, Light& lig
 
 double predict_center_sd_without_lens_px(const Light& light, const ImageSize& image) {
   constexpr double max_lean_rad = rad_from_deg(10);
-  if (light.shape == ShapeKind::rectangle) return 0;
+  if (light.outline_kind == LightOutline::rectangle) return 0;
   const double focal_px = std::hypot(image.width, image.height) / 2;
   const Eigen::Vector2d middle((image.width - 1) / 2.0, (image.height - 1) / 2.0);
   const double off_axis = (light.pixel - middle).norm() / focal_px;

@@ -35,7 +35,7 @@ void add_error_to_center_sigma(double sd_px, Light& light);
 ///
 /// @param off      difference of the log aspect ratios of light and lamp
 /// @param tilt_sd  standard deviation of the log aspect ratio from an unknown tilt
-void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, Light& light);
+void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, MeasuredLight& light);
 
 /// Predicts the error of a lamp's center if the lens is unknown, as a standard deviation per axis,
 /// px. The cause is that the center of an outline is not the image of the lamp's center. Returns 0

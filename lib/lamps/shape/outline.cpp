@@ -59,20 +59,6 @@ void add_edge(const Profile& profile, int width, double dark, std::vector<EdgePo
 
 }  // namespace
 
-std::vector<EdgePoint> select_outermost_edge_points(std::vector<EdgePoint> points) {
-  const auto further_out = [](const EdgePoint& a, const EdgePoint& b) {
-    if (a.pixel.y() != b.pixel.y()) return a.pixel.y() < b.pixel.y();
-    if (a.is_run_begin != b.is_run_begin) return a.is_run_begin;
-    return a.is_run_begin ? a.pixel.x() < b.pixel.x() : a.pixel.x() > b.pixel.x();
-  };
-  const auto same_side = [](const EdgePoint& a, const EdgePoint& b) {
-    return a.pixel.y() == b.pixel.y() && a.is_run_begin == b.is_run_begin;
-  };
-  std::sort(points.begin(), points.end(), further_out);
-  points.erase(std::unique(points.begin(), points.end(), same_side), points.end());
-  return points;
-}
-
 std::vector<EdgePoint> find_blob_outline(const ImageView& image, const Blob& blob,
                                          const Background& background) {
   constexpr int min_width = 8;

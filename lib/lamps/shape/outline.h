@@ -25,10 +25,6 @@ struct EdgePoint {
   bool is_run_begin;
 };
 
-/// Returns the first begin and the last end of each row: the outline of a light that an occluder
-/// splits.
-std::vector<EdgePoint> select_outermost_edge_points(std::vector<EdgePoint> points);
-
 /// Returns the two ends of each run. Excludes ends at the image border and ends of runs that are
 /// too short.
 std::vector<EdgePoint> find_blob_outline(const ImageView& image, const Blob& blob,

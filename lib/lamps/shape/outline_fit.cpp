@@ -28,6 +28,8 @@ constexpr float kGamma = 2.2F;
 constexpr double kMeanTone = 0.85, kToneSd = 0.2;
 /// Blur at which the fit becomes fine, and prior standard deviation of its logarithm.
 constexpr double kBlur_px = 0.9, kLogBlurSd = 0.4;
+/// Unevenness from which on an outline is a rim. The noise of a sharp image causes less.
+constexpr double kMinUnevenness = 0.02;
 /// Standard deviation of the area of a pixel.
 constexpr double kMinBlur_px = 0.29;
 /// Depth, in blurs, from which on a pixel is well inside the outline.
@@ -122,7 +124,9 @@ class DiscFit {
     auto fit = make_result();
     if (!fit) return fit;
     if (step_px >= tolerance_px) fit->add_error_to_center(step_px);
-    if (!is_uneven()) return fit;
+    fit->unevenness = compute_unevenness();
+    fit->level = compute_median_level();
+    if (fit->unevenness < kMinUnevenness) return fit;
     const auto shift_px = measure_shift_in_narrow_band_px();
     if (!shift_px) return std::nullopt;
     fit->add_error_to_center(*shift_px);
@@ -138,17 +142,24 @@ class DiscFit {
            std::abs(radius_px_ - radius_px) > max_change * radius_px;
   }
 
-  /// Returns true if the levels inside vary along the scanlines by more than the noise of a sharp
-  /// image causes.
-  bool is_uneven() const {
-    constexpr double min_slope = 0.02;
+  /// Returns the RMS slope of the levels inside along the scanlines, as a fraction of the level.
+  double compute_unevenness() const {
     double sum = 0, count = 0;
     for (const Cell& cell : cells_) {
       if (cell.size() == 0 || !(cell.contrast() > min_contrast_)) continue;
       sum += std::pow(cell.levels[kInSlope] / std::max(1.0, cell.levels[kIn]), 2);
       ++count;
     }
-    return sum > count * min_slope * min_slope;
+    return std::sqrt(sum / std::max(1.0, count));
+  }
+
+  /// Returns the median of the levels inside of the cells with contrast.
+  double compute_median_level() const {
+    std::vector<double> levels;
+    for (const Cell& cell : cells_) {
+      if (cell.size() > 0 && cell.contrast() > min_contrast_) levels.push_back(cell.levels[kIn]);
+    }
+    return levels.empty() ? 0 : upper_median(std::move(levels));
   }
 
   /// Returns the distance of the center from that of a fit in a narrower band. Levels that do not
@@ -170,31 +181,46 @@ class DiscFit {
 
   void update_radius() { radius_px_ = px_per_unit_ * outline_.radius(); }
 
-  /// Selects the pixels of the band around the outline if it has moved. Returns false if there are
-  /// too few.
+  /// Selects the pixels of the band around the outline if it has moved out of it, and computes
+  /// their depths. Returns false if there are too few.
   bool update_samples() {
     constexpr double min_reach_px = 5, reach_blurs = 3, coarse_reach_blurs = 3.5;
-    constexpr double max_reach_change_px = 0.5, max_depth_error_px = 0.002, max_size_change_px = 1;
+    constexpr double max_reach_change_px = 0.5, max_move_px = 0.5;
     constexpr std::size_t min_samples = 60;
     const double reach_px = is_coarse_ ? coarse_reach_blurs * blur_px_
                                        : band_ * std::max(min_reach_px, reach_blurs * blur_px_);
-    const double depth_error_px = moved_px_ * moved_px_ / (2 * radius_px_);
-    if (levels_.empty() || depth_error_px > max_depth_error_px ||
-        std::abs(size_change_px_) > max_size_change_px ||
+    if (levels_.empty() || moved_px_ + std::abs(size_change_px_) > max_move_px ||
         std::abs(reach_px - reach_px_) > max_reach_change_px) {
       reach_px_ = reach_px;
       moved_px_ = size_change_px_ = 0;
       select_samples();
     }
+    compute_depths();
     return levels_.size() >= min_samples;
+  }
+
+  void compute_depths() {
+    const auto n = Eigen::Index(levels_.size());
+    const Eigen::Map<const Eigen::ArrayXf> x(plane_x_.data(), n), y(plane_y_.data(), n),
+        scale_px(scales_px_.data(), n);
+    const Eigen::Matrix2f unit_from_plane = outline_.unit_from_plane.cast<float>();
+    const Eigen::Vector2f offset =
+        (outline_.unit_from_plane * (start_center_ - outline_.center)).cast<float>();
+    z_ = unit_from_plane(0, 0) * x + unit_from_plane(0, 1) * y + offset.x();
+    t_ = unit_from_plane(1, 0) * x + unit_from_plane(1, 1) * y + offset.y();
+    depths_px_ = (1 - (z_.square() + t_.square()).sqrt()) * scale_px *
+                 static_cast<float>(radius_px_ / selection_radius_px_);
   }
 
   void select_samples() {
     constexpr double bright_quantile = 0.95;
     constexpr std::size_t sample_step = 4;
     levels_.clear();
-    depths_px_.clear();
+    plane_x_.clear();
+    plane_y_.clear();
+    scales_px_.clear();
     d_depths_.clear();
+    selection_radius_px_ = radius_px_;
     cells_.resize(2 * std::size_t(box_.height));
     const Matrix2 unit_from_pixel = outline_.unit_from_plane * d_plane_d_pixel_;
     const Eigen::Vector2d offset = outline_.unit_from_plane * (start_center_ - outline_.center);
@@ -246,11 +272,11 @@ class DiscFit {
     for (Cell& cell : cells_) {
       std::array<float, 2> sums{}, counts{};
       for (std::size_t i = cell.begin; i < cell.end; ++i) {
-        if (std::abs(depths_px_[i]) < clear_px) continue;
-        const std::size_t side = depths_px_[i] > 0 ? kIn : kOut;
+        if (std::abs(depths_px_[Eigen::Index(i)]) < clear_px) continue;
+        const std::size_t side = depths_px_[Eigen::Index(i)] > 0 ? kIn : kOut;
         sums[side] += levels_[i];
         ++counts[side];
-        cell.deepest_px = std::max(cell.deepest_px, double(depths_px_[i]));
+        cell.deepest_px = std::max(cell.deepest_px, double(depths_px_[Eigen::Index(i)]));
       }
       for (const std::size_t side : {kOut, kIn}) {
         const std::size_t known = counts[side] > 0 ? side : 1 - side;
@@ -259,17 +285,19 @@ class DiscFit {
     }
   }
 
-  /// Adds a pixel if it is in the band, with its depth and the derivatives of the depth.
+  /// Adds a pixel if it is in the band, with the derivatives of its depth.
   void add_sample(const PlanePatch::Row& row, int column, int line) {
     const PlanePatch::Point plane = row.at_column(column);
     const Eigen::Vector2d u = outline_.unit_from_plane * (plane.at - outline_.center);
     const double q = u.norm();
     const Eigen::Vector2d d_plane = outline_.unit_from_plane.transpose() * u / q;
     const double px = 1 / (plane.d_at_d_pixel.transpose() * d_plane).norm();
-    const double depth_px = (1 - q) * px;
-    if (!(std::abs(depth_px) < reach_px_)) return;
+    if (!(std::abs((1 - q) * px) < reach_px_)) return;
+    const Eigen::Vector2d from_start = plane.at - start_center_;
     levels_.push_back(static_cast<float>(lines_.gray_level_at_pixel(column, line)));
-    depths_px_.push_back(static_cast<float>(depth_px));
+    plane_x_.push_back(static_cast<float>(from_start.x()));
+    plane_y_.push_back(static_cast<float>(from_start.y()));
+    scales_px_.push_back(static_cast<float>(px));
     const double c = u.x() / q, s = u.y() / q, per_px = q * px / radius_px_;
     d_depths_.push_back((Geometry() << float(d_plane.x() * px / px_per_unit_),
                          float(d_plane.y() * px / px_per_unit_), float(per_px),
@@ -294,8 +322,7 @@ class DiscFit {
       power_.segment(begin, size) = std::pow(ratio, kGamma);
       sign_.segment(begin, size) = out > in ? -1.F : 1.F;
     }
-    const Eigen::Map<const Eigen::ArrayXf> depth(depths_px_.data(), n);
-    z_ = depth * float(1 / blur_px_);
+    z_ = depths_px_ * float(1 / blur_px_);
     density_ = (-0.5F * z_.square()).exp() * float(1 / std::sqrt(2 * std::numbers::pi));
     // Normal distribution, Abramowitz and Stegun 26.2.17; error 7.5e-8.
     t_ = (1 + 0.2316419F * z_.abs()).inverse();
@@ -316,20 +343,22 @@ class DiscFit {
 
   /// Returns the shares of the levels of the cell in that of a sample.
   Eigen::Vector4f compute_shares(std::size_t sample) const {
-    const float inside = coverage_[Eigen::Index(sample)], depth_px = depths_px_[sample];
+    const float inside = coverage_[Eigen::Index(sample)],
+                depth_px = depths_px_[Eigen::Index(sample)];
     return {1 - inside, inside, depth_px * inside, depth_px * (1 - inside)};
   }
 
-  double predict_variance(double level) const {
-    constexpr double min_fraction = 0.1;
+  float predict_variance(float level) const {
+    constexpr float min_fraction = 0.1F;
     // Errors of the model are not proportional to the level: dark pixels must not dominate.
-    return predict_variance(variance_per_level_,
-                            std::max(level - background_.level, min_fraction * bright_level_));
+    return predict_variance(static_cast<float>(variance_per_level_),
+                            std::max(level - static_cast<float>(background_.level),
+                                     min_fraction * static_cast<float>(bright_level_)));
   }
-  double predict_variance(double variance_per_level, double level) const {
-    constexpr double quantization = 0.1, model_error = 0.003;
-    return background_.noise * background_.noise + quantization + variance_per_level * level +
-           model_error * model_error * level * level;
+  float predict_variance(float variance_per_level, float level) const {
+    constexpr float quantization = 0.1F, model_error = 0.003F;
+    return static_cast<float>(background_.noise * background_.noise) + quantization +
+           (variance_per_level + model_error * model_error * level) * level;
   }
 
   /// Solves for the levels of all cells, and sums the products of their derivatives. Returns false
@@ -352,11 +381,11 @@ class DiscFit {
     weights_.resize(cell.size());
     for (std::size_t i = cell.begin; i < cell.end; ++i) {
       const Eigen::Vector4f shares = compute_shares(i);
-      const auto weight = static_cast<float>(1 / predict_variance(shares.dot(old_levels)));
+      const float weight = 1 / predict_variance(shares.dot(old_levels));
       weights_[i - cell.begin] = weight;
       shares_square.noalias() += weight * shares * shares.transpose();
       right += weight * levels_[i] * shares;
-      deepest = std::max(deepest, depths_px_[i]);
+      deepest = std::max(deepest, depths_px_[Eigen::Index(i)]);
     }
     cell.deepest_px = deepest;
     const auto [prediction, information] = predict_levels(index);
@@ -384,7 +413,7 @@ class DiscFit {
     for (std::size_t i = cell.begin; i < cell.end; ++i) {
       const auto at = Eigen::Index(i);
       const Eigen::Vector4f shares = compute_shares(i);
-      const float d_coverage = contrast + slope_contrast * depths_px_[i];
+      const float d_coverage = contrast + slope_contrast * depths_px_[at];
       const float d_z = d_coverage * d_z_[at];
       const float d_depth =
           d_z * per_blur + levels[kInSlope] * shares[kIn] + levels[kOutSlope] * shares[kOut];
@@ -465,7 +494,8 @@ class DiscFit {
     min_contrast_ = min_contrast * compute_quantile(std::move(contrasts), high_quantile);
     for (const Cell& cell : cells_) {
       if (cell.size() == 0 || !(cell.contrast() > min_contrast_)) continue;
-      slopes.push_back((cell.mean_square - predict_variance(0, cell.mean_level)) / cell.mean_level);
+      const float without_slope = predict_variance(0, static_cast<float>(cell.mean_level));
+      slopes.push_back((cell.mean_square - without_slope) / cell.mean_level);
       squares.push_back(cell.mean_weighted_square);
     }
     double max_square = std::numeric_limits<double>::infinity();
@@ -546,10 +576,8 @@ class DiscFit {
     update_radius();
     blur_px_ = std::max(kMinBlur_px, blur_px_ * std::exp(step[kLogBlur]));
     tone_ = std::clamp(tone_ + step[kTone], 0.0, max_tone);
-    const Geometry moved = step.head<kGeometry>().cast<float>();
     moved_px_ += std::hypot(step.head<2>().norm(), step.segment<2>(kOval0).norm());
     size_change_px_ += step[kSize];
-    for (std::size_t i = 0; i < depths_px_.size(); ++i) depths_px_[i] += moved.dot(d_depths_[i]);
     products_.col(kUnknowns).head<kUnknowns>() -=
         products_.topLeftCorner<kUnknowns, kUnknowns>() * step;
     return std::max(step_px, size_weight * size_px);
@@ -598,8 +626,8 @@ class DiscFit {
                   estimate_inflation()});
     const double variance_px2 = inflation * covariance.topLeftCorner<2, 2>().trace() / 2;
     if (!std::isfinite(variance_px2)) return std::nullopt;
-    OutlineFit fit{outline_, std::sqrt(variance_px2), radius_px_, blur_px_, inlier_fraction_, {},
-                   {}};
+    OutlineFit fit{
+        outline_, std::sqrt(variance_px2), radius_px_, blur_px_, inlier_fraction_, 0, 0, {}, {}};
     // Eliminates blur and tone, with their priors; the ovality has none.
     constexpr int eliminated = kUnknowns - kGeometry;
     normal = free_normal;
@@ -636,12 +664,15 @@ class DiscFit {
   double reach_px_ = 0, moved_px_ = 0, size_change_px_ = 0;
   double band_ = 1;  ///< factor of the half width
   bool is_coarse_ = true;
-  // Pixels of the band, cell by cell: level, depth, and derivatives of the depth.
-  std::vector<float> levels_, depths_px_;
+  // Pixels of the band, cell by cell: level, position in the plane relative to the first center,
+  // pixels per unit of the distance from the center in radii, and derivatives of the depth.
+  std::vector<float> levels_, plane_x_, plane_y_, scales_px_;
   std::vector<Geometry> d_depths_;
+  double selection_radius_px_ = 1;  ///< radius to which scales_px_ belongs
   std::vector<Cell> cells_;
   // Values of each sample in one round.
-  Eigen::ArrayXf ratio_, power_, sign_, z_, density_, t_, coverage_, coded_, d_tone_, d_z_;
+  Eigen::ArrayXf depths_px_, ratio_, power_, sign_, z_, density_, t_, coverage_, coded_, d_tone_,
+      d_z_;
   std::vector<float> weights_;  // weights of the samples of one cell
   Products<double> products_;
   double squares_ = 0, degrees_of_freedom_ = 0, inlier_fraction_ = 0, min_contrast_ = 0;
@@ -682,10 +713,26 @@ void OutlineFit::add_error_to_center(double sd_px) {
   gradient *= ratio;
 }
 
-bool KnownRadius::agrees_with(const Light& light) const {
+bool KnownRadius::agrees_with(const MeasuredLight& light) const {
   constexpr double max_sds = 2, max_rim_error = 0.02, max_edge_error = 0.03;
   return std::abs(std::log(light.plane_outline.radius() / radius)) <
-         max_sds * log_sd + (light.is_uneven ? max_rim_error : max_edge_error);
+         max_sds * log_sd +
+             (light.outline_kind == LightOutline::rim ? max_rim_error : max_edge_error);
+}
+
+bool KnownRadius::improves_fit(const MeasuredLight& light) const {
+  constexpr double min_fraction = 0.1, max_sds = 2;
+  if (!light.outline_equations) return false;
+  if (light.outline_kind == LightOutline::rim) return true;
+  const Eigen::Matrix3d covariance =
+      light.outline_equations->matrix.topLeftCorner<3, 3>().inverse();
+  const double center_variance = covariance.topLeftCorner<2, 2>().trace();
+  const double size_variance = covariance(kSize, kSize) + log_sd * log_sd;
+  const double change = std::log(radius / light.plane_outline.radius());
+  const double gain = covariance.col(kSize).head<2>().squaredNorm() / size_variance;
+  return change * change > max_sds * max_sds * size_variance ||
+         gain * change * change > min_fraction * min_fraction * center_variance * size_variance ||
+         gain > min_fraction * center_variance;
 }
 
 std::optional<OutlineFit> fit_disc_outline(const ImageView& lines, const PlaneEllipse& start,
@@ -707,10 +754,15 @@ std::optional<OutlineFit> fit_disc_outline(const ImageView& lines, const PlaneEl
   return fit.run(start_blur_px);
 }
 
-bool set_fitted_outline(OutlineFit fit, const LightShape& shape, Light& light) {
-  constexpr double rim_error = 0.0005;  // in radii
-  if (light.is_uneven) fit.add_error_to_center(rim_error * fit.radius_px);
+bool set_fitted_outline(OutlineFit fit, const LightShape& shape, MeasuredLight& light) {
+  constexpr double rim_error = 0.0005, min_unevenness = 0.03;  // in radii; of rims with this error
+  if (light.has_bright_core || fit.unevenness > min_unevenness)
+    fit.add_error_to_center(rim_error * fit.radius_px);
   if (!shape.set_outline_of_light(fit.outline, fit.radius_px, light)) return false;
+  light.outline_kind = light.has_bright_core || fit.unevenness > kMinUnevenness
+                           ? LightOutline::rim
+                           : LightOutline::edge;
+  light.inlier_fraction = fit.inlier_fraction;
   light.rise_px = kRisePerBlur * fit.blur_px;
   light.sigma_px = std::clamp(fit.center_sd_px, kMinSigma_px, kMaxSigma_px);
   if (shape.has_known_lens()) {

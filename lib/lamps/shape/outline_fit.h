@@ -22,6 +22,9 @@ struct OutlineFit {
   double radius_px, blur_px;
   /// Fraction of the ends of scanlines with contrast that agree with the outline.
   double inlier_fraction;
+  /// RMS slope of the levels inside along the scanlines, per pixel and as a fraction of the level;
+  /// median of the levels inside, above the dark level.
+  double unevenness, level;
   /// Normal equations with free ovality, in units of the radius; see OutlineEquations.
   OutlineEquations::Matrix5 matrix;
   OutlineEquations::Vector5 gradient;
@@ -40,7 +43,13 @@ struct KnownRadius {
 
   /// Returns true if a light has this radius, within two standard deviations and the error of its
   /// outline.
-  bool agrees_with(const Light& light) const;
+  bool agrees_with(const MeasuredLight& light) const;
+
+  /// Returns true if this prior differs from the radius of a light by more than two standard
+  /// deviations, would move its center by more than a tenth of its standard deviation, or would
+  /// reduce the variance of the center by more than a tenth. True for rims, whose size depends on
+  /// the reflector; false without a lens.
+  bool improves_fit(const MeasuredLight& light) const;
 };
 
 /// Fits the outline of a disc to the levels of all pixels within 5 px or 3 blurs of it.
@@ -82,9 +91,10 @@ std::optional<OutlineFit> fit_disc_outline(const ImageView& lines, const PlaneEl
                                            const Background& background, const LightShape& shape,
                                            const std::optional<KnownRadius>& known_radius = {});
 
-/// Sets the outline of a light: center, sigma, box, radius, width of the edge, and with a lens
-/// outline_equations. Adds 0.05 % of the radius to the standard deviation of the center of a rim.
-/// Returns false, and changes nothing, if the lens does not cover the outline.
-bool set_fitted_outline(OutlineFit fit, const LightShape& shape, Light& light);
+/// Sets the outline of a light: its kind (edge or rim), center, sigma, box, radius, points, width
+/// of the edge, inlier fraction, and with a lens outline_equations. Adds 0.05 % of the radius to
+/// the standard deviation of the center of a rim, unless its level varies little. Returns false,
+/// and changes nothing, if the lens does not cover the outline.
+bool set_fitted_outline(OutlineFit fit, const LightShape& shape, MeasuredLight& light);
 
 }  // namespace vlp

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <optional>
 
 #include "geometry/types.h"
@@ -14,9 +15,10 @@ namespace vlp {
 
 /// Map from the pixels (column, line) of a box to the plane of LightShape: a polynomial of degree
 /// 7, fitted at 8 x 8 Chebyshev nodes. Its error is below 0.01 px for a lens of 80 degrees and
-/// boxes of half of the image.
+/// boxes of half of the image. Terms of high degree are not evaluated if their sum is below 1e-4
+/// px.
 class PlanePatch {
-  static constexpr int kDegree = 7, kTerms = (kDegree + 1) * (kDegree + 2) / 2;
+  static constexpr int kMaxDegree = 7, kTerms = (kMaxDegree + 1) * (kMaxDegree + 2) / 2;
 
  public:
   /// Point of the plane, and its derivative with respect to (column, line).
@@ -36,11 +38,15 @@ class PlanePatch {
 
    private:
     double middle_, half_;
-    std::array<Eigen::Vector2d, kDegree + 1> at_, d_line_;
+    std::size_t degree_;
+    std::array<Eigen::Vector2d, kMaxDegree + 1> at_, d_line_;
   };
 
  private:
+  int find_sufficient_degree() const;
+
   Eigen::Vector2d middle_, half_;
+  int degree_;
   Eigen::Matrix<double, kTerms, 2> coefficients_;
 };
 

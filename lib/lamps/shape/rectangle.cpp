@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "geometry/angles.h"
+#include "geometry/circle_fit.h"
 #include "geometry/polygon.h"
 #include "geometry/symmetric.h"
 #include "lamps/shape/light_center_noise.h"
@@ -382,10 +383,10 @@ bool does_outline_reach_corners(const std::vector<Eigen::Vector2d>& points, cons
 }
 
 /// Makes a light of four edges; `points` are the outline in the plane.
-std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px,
-                               const std::vector<Eigen::Vector2d>& points,
-                               const Eigen::Vector2d& middle, const LightShape& shape) {
-  constexpr double outlier_px = 3;
+std::optional<MeasuredLight> fit_light(std::array<StraightEdge, 4>& edges, double per_px,
+                                       const std::vector<Eigen::Vector2d>& points,
+                                       const Eigen::Vector2d& middle, const LightShape& shape) {
+  constexpr double outlier_px = 3, max_outside = 0.25;
   Sides sides;
   EndsCovariance ends = EndsCovariance::Zero();
   for (std::size_t i = 0; i < 4; ++i) {
@@ -402,7 +403,7 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
   auto pixel = shape.pixel_from_level_plane_point(*center);
   const auto around = make_polygon(sides, 0, shape);
   if (!pixel || !covariance || around.empty()) return std::nullopt;
-  Light light{};
+  MeasuredLight light{};
   double lens_sd_px = 0;
   if (!shape.has_known_lens()) {
     const CenterOffset behind =
@@ -410,11 +411,10 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
     *pixel += behind.shift;
     lens_sd_px = behind.sd_px;
   }
-  light.pixel = light.box_min = light.box_max = *pixel;
-  for (const Eigen::Vector2d& at : around) {
-    light.box_min = light.box_min.cwiseMin(at);
-    light.box_max = light.box_max.cwiseMax(at);
-  }
+  light.outline_kind = LightOutline::rectangle;
+  light.pixel = *pixel;
+  light.box = Eigen::AlignedBox2d(*pixel);
+  for (const Eigen::Vector2d& at : around) light.box.extend(at);
   light.radius_px = std::sqrt(compute_polygon_area(around) / std::numbers::pi);
   double sagitta_px = 0, end_sd_px = 0;
   light.inlier_fraction = 1;
@@ -423,10 +423,11 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
     sagitta_px = std::max(sagitta_px, std::abs(edge.sagitta_px));
     light.rise_px = std::max(light.rise_px, edge.points.empty() ? 0 : edge.points[0].rise_px);
     light.inlier_fraction = std::min(light.inlier_fraction, edge.explained_fraction);
-    light.outline.insert(light.outline.end(), edge.points.begin(), edge.points.end());
+    for (const EdgePoint& point : edge.points)
+      light.outline.push_back(shape.swap_image_and_scanline_axes(point.pixel));
   }
-  light.box_min.array() -= 2 * end_sd_px;
-  light.box_max.array() += 2 * end_sd_px;
+  light.box.min().array() -= 2 * end_sd_px;
+  light.box.max().array() += 2 * end_sd_px;
   const auto sigma_px = limit_center_sd(std::hypot(compute_center_sd(*covariance), lens_sd_px));
   if (!sigma_px) return std::nullopt;
   light.sigma_px = *sigma_px;
@@ -435,7 +436,7 @@ std::optional<Light> fit_light(std::array<StraightEdge, 4>& edges, double per_px
       return (at - side.from).dot(side.inward_normal()) < -(outlier_px + sagitta_px) * per_px;
     });
   });
-  light.outside_ratio = double(outliers) / double(points.size());
+  if (double(outliers) > max_outside * double(points.size())) return std::nullopt;
   light.inner_polygon = make_polygon(sides, outlier_px * per_px, shape);
   light.aspect = compute_aspect(sides);
   light.aspect_sd = compute_aspect_sd(edges, per_px);
@@ -646,10 +647,11 @@ std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>&
   return chords;
 }
 
-std::optional<Light> fit_rectangular_light(const ImageView& lines, const Blob& blob,
-                                           const std::vector<EdgePoint>& outline,
-                                           const Background& background, const LightShape& shape,
-                                           const std::vector<Eigen::Vector2d>& sizes_m) {
+std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const Blob& blob,
+                                                   const std::vector<EdgePoint>& outline,
+                                                   const Background& background,
+                                                   const LightShape& shape,
+                                                   const std::vector<Eigen::Vector2d>& sizes_m) {
   constexpr double min_px = 10, max_aspect = 40;
   const PixelBox box = blob.blob_bounding_box();
   if (outline.size() < kMinOutlinePoints || std::min(box.width, box.height) < min_px) return {};
@@ -660,11 +662,16 @@ std::optional<Light> fit_rectangular_light(const ImageView& lines, const Blob& b
   if (!first) return std::nullopt;
 
   // A disc that stripes partly hide is less slender than this.
-  constexpr double min_aspect = 3;
+  constexpr double min_aspect = 3, max_round_off_px = 1;
   const auto is_rather_round = [&](const Sides& sides) {
     if (compute_aspect(sides) > min_aspect) return false;
-    const auto disc = shape.fit_light_to_outline(outline, background);
-    return disc && disc->inlier_fraction >= first->near;
+    const auto disc = fit_circle(in_plane->points);
+    if (!disc) return false;
+    const auto near = std::ranges::count_if(in_plane->points, [&](const Eigen::Vector2d& at) {
+      const double off = (at - disc->circle.center).norm() - disc->circle.radius;
+      return std::abs(off) < max_round_off_px * per_px;
+    });
+    return double(near) >= first->near * double(in_plane->points.size());
   };
   FittedRectangle rectangle{{}, first->corners, 0, 0};
   struct Pass {

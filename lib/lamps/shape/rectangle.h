@@ -12,6 +12,7 @@
 #include "lamps/image/pixel_runs.h"
 #include "lamps/shape/light.h"
 #include "lamps/shape/light_center.h"
+#include "lamps/shape/outline.h"
 
 namespace vlp {
 
@@ -48,10 +49,11 @@ inline constexpr double kUnknownTiltSd = 0.06;
 ///     ratio above 40.
 ///   - An edge that is not hidden is outside the image or not found.
 ///   - Edges are hidden and a circle explains more of the outline.
-std::optional<Light> fit_rectangular_light(const ImageView& lines, const Blob& blob,
-                                           const std::vector<EdgePoint>& outline,
-                                           const Background& background, const LightShape& shape,
-                                           const std::vector<Eigen::Vector2d>& sizes_m);
+std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const Blob& blob,
+                                                   const std::vector<EdgePoint>& outline,
+                                                   const Background& background,
+                                                   const LightShape& shape,
+                                                   const std::vector<Eigen::Vector2d>& sizes_m);
 
 /// Returns the pixels inside a convex polygon, (column, row), on each line of an image of `size`.
 std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,

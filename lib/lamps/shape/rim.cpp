@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "lamps/shape/rim.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -56,6 +57,29 @@ std::optional<Matrix2> compute_plane_from_pixel(const LightShape& shape,
   return derivative;
 }
 
+/// Returns the shape of a blob, scaled to an area of pi, from the second moments of its pixels:
+/// unit_from_pixel of the ellipse with these moments. Returns std::nullopt if it is nearly round.
+std::optional<Matrix2> compute_shape_of_blob(const Blob& blob) {
+  constexpr double min_axis_ratio = 1.15;
+  double count = 0;
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  Matrix2 squares = Matrix2::Zero();
+  for (const PixelRun& run : blob.runs) {
+    const double width = run.pixel_run_width_px();
+    const Eigen::Vector2d middle((run.begin + run.end - 1) / 2.0, run.row);
+    count += width;
+    sum += width * middle;
+    squares += width * middle * middle.transpose();
+    squares(0, 0) += width * (width * width - 1) / 12;
+  }
+  const Matrix2 covariance = squares / count - sum * sum.transpose() / (count * count);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes{Eigen::Matrix2d(covariance)};
+  const Eigen::Vector2d variances = axes.eigenvalues();
+  if (!(variances[0] > 0) || variances[1] < min_axis_ratio * min_axis_ratio * variances[0])
+    return std::nullopt;
+  return Matrix2(axes.operatorInverseSqrt() * std::sqrt(std::sqrt(variances.prod())));
+}
+
 /// Ellipse in the image, and the sum of e over its crossings with lit scanlines.
 struct Ring {
   Ellipse ellipse;
@@ -90,6 +114,8 @@ class Face {
   const PixelBox& box() const { return box_; }
   /// Returns the scanlines of bright stripes.
   const std::vector<int>& bright_stripe_scanlines() const { return lit_; }
+  /// Returns the median of the bright levels of these scanlines, above the dark level.
+  double bright_level() const { return bright_level_; }
   bool has(int column) const {
     return column >= box_.x + window_ && column + window_ <= box_.end_column();
   }
@@ -136,6 +162,7 @@ class Face {
   void find_scanlines_of_bright_stripes(double min_level) {
     constexpr double min_lit = 0.55;
     std::vector<double> brightest(static_cast<std::size_t>(box_.height));
+    std::vector<double> lit_levels;
     std::vector<float> line;
     for (int row = 0; row < box_.height; ++row) {
       const auto begin = levels_.begin() + std::ptrdiff_t(index(box_.y + row, box_.x));
@@ -151,13 +178,15 @@ class Face {
       const double level = brightest[static_cast<std::size_t>(row)];
       if (level > min_level && level > min_lit * *std::max_element(begin, end)) {
         lit_.push_back(box_.y + row);
+        lit_levels.push_back(level);
       }
     }
+    if (!lit_levels.empty()) bright_level_ = upper_median(std::move(lit_levels));
   }
 
   PixelBox box_;
   int window_;
-  double soft_;
+  double soft_, bright_level_ = 0;
   std::vector<float> levels_, means_;  // row by row
   std::vector<int> lit_;
 };
@@ -232,58 +261,31 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
   const double size = std::max(blob.width, blob.height), step = std::max(1.0, size / 2 / fine);
   const Eigen::Vector2d middle(blob.x + blob.width / 2.0, blob.y + blob.height / 2.0);
   Ring best{{middle, unit_plane_from_pixel}, -std::numeric_limits<double>::infinity()};
-  for (double radius = range.min_px; radius <= range.max_px; radius += step) {
-    const Matrix2 unit_from_pixel = unit_plane_from_pixel / radius;
-    for (double dv = -max_shift * size; dv <= max_shift * size; dv += step) {
-      for (double du = -max_shift * size; du <= max_shift * size; du += step) {
-        const Ellipse ellipse{middle + Eigen::Vector2d(du, dv), unit_from_pixel};
-        const double sum = steps.sum_steps_along_ellipse(ellipse, best.sum);
-        if (sum > best.sum) best = {ellipse, sum};
+  const auto search = [&](const RadiusRange& radii, double max_shift_px) {
+    for (double radius = radii.min_px; radius <= radii.max_px; radius += step) {
+      const Matrix2 unit_from_pixel = unit_plane_from_pixel / radius;
+      for (double dv = -max_shift_px; dv <= max_shift_px; dv += step) {
+        for (double du = -max_shift_px; du <= max_shift_px; du += step) {
+          const Ellipse ellipse{middle + Eigen::Vector2d(du, dv), unit_from_pixel};
+          const double sum = steps.sum_steps_along_ellipse(ellipse, best.sum);
+          if (sum > best.sum) best = {ellipse, sum};
+        }
       }
     }
-  }
+  };
+  // A ring near the border of the blob is probable. Its sum excludes most others quickly.
+  search({std::max(range.min_px, size / 2 - 2 * step), std::min(range.max_px, size / 2)}, 2 * step);
+  search(range, max_shift * size);
   return best;
-}
-
-/// Returns the level above the dark level that one line of ten exceeds at the middle or the
-/// quarters of its runs.
-double measure_bright_level(const ImageView& image, const Blob& blob, double dark) {
-  std::vector<int> levels;
-  levels.reserve(blob.runs.size());
-  for (const PixelRun& run : blob.runs) {
-    int& level = levels.emplace_back(0);
-    for (const int quarters : {1, 2, 3}) {
-      const int column = run.begin + quarters * (run.pixel_run_width_px() / 4);
-      level = std::max(level, image.gray_level_at_pixel(column, run.row));
-    }
-  }
-  const auto tenth = levels.begin() + std::ptrdiff_t(levels.size() * 9 / 10);
-  std::nth_element(levels.begin(), tenth, levels.end());
-  return *tenth - dark;
 }
 
 }  // namespace
 
-bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
-                          const std::vector<EdgePoint>& outline, const Background& background) {
-  constexpr double much = 3, min_ends = 0.2;
-  constexpr int min_width = 8;
-  if (outline.empty()) return false;
-  const auto wide = std::count_if(blob.runs.begin(), blob.runs.end(), [](const PixelRun& run) {
-    return run.pixel_run_width_px() >= min_width;
-  });
-  if (double(outline.size()) < min_ends * 2 * double(wide)) return true;
-  std::vector<double> levels;
-  levels.reserve(outline.size());
-  for (const EdgePoint& point : outline) levels.push_back(point.level);
-  return measure_bright_level(image, blob, background.level) >
-         much * upper_median(std::move(levels));
-}
-
-std::optional<Light> fit_rim_of_light(const ImageView& image, const Blob& blob, double period_lines,
-                                      const Background& background, const LightShape& shape,
-                                      const std::optional<KnownRadius>& radius) {
-  constexpr int min_size = 20, min_lines = 10;
+std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob& blob,
+                                              double period_lines, const Background& background,
+                                              const LightShape& shape,
+                                              const std::optional<KnownRadius>& radius) {
+  constexpr int min_size = 8, min_lines = 5;
   constexpr double margin = 0.2, min_step = 0.28, min_known_step = 0.15, max_radius = 0.75,
                    max_sds = 2;
   constexpr double min_start_blur_px = 1.5, start_blur = 0.04, max_center_sd = 0.006;
@@ -307,7 +309,18 @@ std::optional<Light> fit_rim_of_light(const ImageView& image, const Blob& blob, 
             window = std::max(std::clamp(size / 30, 2, 6), size / 50);
   const Face face(image, wide, background, window);
   if (face.bright_stripe_scanlines().size() < min_lines) return std::nullopt;
-  const Ring best = find_best_ring(face, box, *plane_from_pixel / plane_per_px, range);
+  // Without a lens the axis ratio of a disc is unknown.
+  constexpr double min_oval_gain = 1.2;
+  Matrix2 unit_from_pixel = *plane_from_pixel / plane_per_px;
+  Ring best = find_best_ring(face, box, unit_from_pixel, range);
+  const auto blob_shape = shape.has_known_lens() ? std::nullopt : compute_shape_of_blob(blob);
+  if (blob_shape) {
+    const Ring oval = find_best_ring(face, box, *blob_shape, range);
+    if (oval.sum > min_oval_gain * best.sum) {
+      best = oval;
+      unit_from_pixel = *blob_shape;
+    }
+  }
   const auto crossings = 2 * std::count_if(face.bright_stripe_scanlines().begin(),
                                            face.bright_stripe_scanlines().end(), [&](int line) {
                                              return best.ellipse.intersect(line).has_value();
@@ -318,25 +331,17 @@ std::optional<Light> fit_rim_of_light(const ImageView& image, const Blob& blob, 
       shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(best.ellipse.center));
   if (!center) return std::nullopt;
   const double ring_radius_px = 1 / std::sqrt(std::abs(best.ellipse.unit_from_pixel.determinant()));
-  const auto fit =
-      fit_disc_outline(image, {*center, Matrix2::Identity() / (plane_per_px * ring_radius_px)},
-                       std::max(min_start_blur_px, start_blur * ring_radius_px), period_lines,
-                       background, shape, radius);
-  Light light{};
-  light.is_uneven = true;
+  const auto fit = fit_disc_outline(
+      image, {*center, unit_from_pixel * plane_from_pixel->inverse() / ring_radius_px},
+      std::max(min_start_blur_px, start_blur * ring_radius_px), period_lines, background, shape,
+      radius);
+  constexpr double min_core_ratio = 2;
+  MeasuredLight light{};
+  light.has_bright_core = fit && face.bright_level() > min_core_ratio * fit->level;
   if (!fit || fit->center_sd_px > max_center_sd * fit->radius_px ||
       !set_fitted_outline(*fit, shape, light) || (radius && !radius->agrees_with(light))) {
     return std::nullopt;
   }
-  constexpr int num_outline_points = 64;
-  for (int i = 0; i < num_outline_points; ++i) {
-    const double angle = 2 * std::numbers::pi * i / num_outline_points;
-    const auto pixel = shape.pixel_from_level_plane_point(
-        light.plane_outline.center + light.plane_outline.unit_from_plane.inverse() *
-                                         Eigen::Vector2d(std::cos(angle), std::sin(angle)));
-    if (pixel) light.outline.push_back({shape.swap_image_and_scanline_axes(*pixel), 0, 0, false});
-  }
-  light.inlier_fraction = fit->inlier_fraction;
   return light;
 }
 

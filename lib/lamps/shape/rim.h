@@ -14,12 +14,6 @@
 
 namespace vlp {
 
-/// Returns true if a blob is three times as bright inside as next to its outline, in at least one
-/// line of ten. Also returns true if less than 20 % of the ends of its runs have an outline
-/// point. Returns false if `outline` is empty.
-bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
-                          const std::vector<EdgePoint>& outline, const Background& background);
-
 /// Fits the rim of an unevenly lit light, such as a source deep in a reflector. Its core is at
 /// least ten times as bright as its rim and moves with the point of view. A part of the rim is
 /// dark, and the ceiling around it is lit. A rim appears as a step, not as a level. The step at a
@@ -45,8 +39,9 @@ bool is_blob_unevenly_lit(const ImageView& image, const Blob& blob,
 ///     less than 10 lit scanlines; if no circle has such steps; if the outline has no fit, see
 ///     fit_disc_outline(); if the standard deviation of the center is above 0.6 % of the radius; or
 ///     if the radius is another one than the known one
-std::optional<Light> fit_rim_of_light(const ImageView& image, const Blob& blob, double period_lines,
-                                      const Background& background, const LightShape& shape,
-                                      const std::optional<KnownRadius>& radius = {});
+std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob& blob,
+                                              double period_lines, const Background& background,
+                                              const LightShape& shape,
+                                              const std::optional<KnownRadius>& radius = {});
 
 }  // namespace vlp

@@ -11,6 +11,7 @@
 #include "lamps/image/image_view.h"
 #include "lamps/shape/light_center.h"
 #include "lamps/shape/line_levels.h"
+#include "lamps/shape/outline.h"
 
 namespace vlp {
 

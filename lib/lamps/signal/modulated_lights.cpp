@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <complex>
+#include <iterator>
 #include <numbers>
 #include <utility>
 
@@ -41,6 +42,8 @@ struct RegionCandidate {
   double phase_coherence = 0;
   bool is_modulated = false;
   bool is_other_period = false;  ///< a period of no lamp fits better
+  /// True if it is a part in phase of a region that is out of phase.
+  bool is_split_off = false;
 };
 
 /// Returns the log-likelihood ratio of two fits. Three harmonics leave 6 independent values of a
@@ -84,23 +87,6 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
     profile.levels.push_back(std::max(0.0, sum));
   }
   return profile;
-}
-
-/// Fits a lamp's period within its drift.
-PeriodFit fit_period_of_lamp(const LineProfile& profile, double period_lines) {
-  constexpr double finest = kLampDrift / 128;
-  PeriodFit best = fit_periodic_signal(profile, period_lines);
-  const auto improve = [&](double drift) {
-    if (std::abs(drift) > kLampDrift) return;
-    const PeriodFit fit = fit_periodic_signal(profile, period_lines * (1 + drift));
-    if (fit.unexplained_fraction < best.unexplained_fraction) best = fit;
-  };
-  for (double step = kLampDrift; step > finest; step /= 2) {
-    const double middle = best.period_lines / period_lines - 1;
-    improve(middle - step);
-    improve(middle + step);
-  }
-  return best;
 }
 
 std::size_t find_best_matching_lamp(const RegionCandidate& candidate) {
@@ -150,6 +136,9 @@ void assign_lamp(const Claims& claims, RegionCandidate& candidate) {
 double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map,
                                const ModulatedRegion& region, double period_lines) {
   const double period = period_lines / cells.lines_per_bin;
+  std::vector<std::complex<double>> carrier;
+  for (int bin = 0; bin < cells.bins; ++bin)
+    carrier.push_back(std::polar(1.0, -2 * std::numbers::pi * (bin + 0.5) / period));
   std::complex<double> sum;
   double amplitudes = 0;
   for (const auto& [step, begin, end] : region.spans) {
@@ -162,8 +151,8 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
       std::complex<double> z;
       for (int bin = first; bin < last; ++bin) {
         const double weight = std::max(0.0, period - std::abs(bin + 0.5 - middle));
-        z += std::polar(weight * double(cells.cell_levels_in_scanline_band(bin)[cell]),
-                        -2 * std::numbers::pi * (bin + 0.5) / period);
+        z += weight * double(cells.cell_levels_in_scanline_band(bin)[cell]) *
+             carrier[std::size_t(bin)];
       }
       sum += z;
       amplitudes += std::abs(z);
@@ -181,15 +170,16 @@ double count_periods(const RegionCandidate& candidate) {
 RegionCandidate examine_region(const CellLevels& cells, const ModulationMap& map,
                                ModulatedRegion region, std::span<const double> lamp_periods_lines,
                                double min_period_lines) {
-  RegionCandidate candidate{std::move(region), {}, {}, {}, {}, 0, false, false};
+  RegionCandidate candidate{std::move(region), {}, {}, {}, {}, 0, false, false, false};
   double margin = min_period_lines;
   for (const double period : lamp_periods_lines) margin = std::max(margin, period);
   candidate.profile = compute_profile(cells, map, candidate.region, margin);
   const LineProfile& profile = candidate.profile;
   candidate.fit = find_best_fitting_period(profile, min_period_lines);
   for (const double period : lamp_periods_lines) {
-    candidate.lamp_fits.push_back(period < kMinPeriod_lines ? PeriodFit{period}
-                                                            : fit_period_of_lamp(profile, period));
+    candidate.lamp_fits.push_back(period < kMinPeriod_lines
+                                      ? PeriodFit{period}
+                                      : fit_period_near(profile, period, kLampDrift));
   }
   if (!lamp_periods_lines.empty()) {
     const PeriodFit& lamp = candidate.lamp_fits[find_best_matching_lamp(candidate)];
@@ -247,16 +237,19 @@ void add_region_area(const ModulationMap& map, const ModulatedRegion& region, do
   }
 }
 
-/// Measures the stripes of a candidate after division by its envelope. Their period is that of the
-/// fit, because stripes that the ends of a light cut bias that of measure_stripes().
+/// Measures the stripes of a candidate after division by its envelope. Their period is that of a
+/// fit beyond the drift of the lamp, which does not depend on the given row time. Stripes that the
+/// ends of a light cut bias that of measure_stripes().
 Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
-  const PeriodFit& fit = candidate.fit;
+  const PeriodFit fit =
+      fit_period_near(candidate.profile, candidate.fit.period_lines, 2 * kLampDrift);
   Stripes stripes =
       measure_stripes(divide_profile_by_envelope(candidate.profile, fit.period_lines));
   stripes.period_lines = fit.period_lines;
   stripes.periodicity_r2 = 1 - fit.unexplained_fraction;
   stripes.periods = count_periods(candidate);
   stripes.is_regular = true;
+  stripes.coherence = candidate.phase_coherence;
   return stripes;
 }
 
@@ -306,9 +299,9 @@ ModulatedLight make_light(const ModulationMap& map,
                        brightest.fit,
                        brightest.lamp,
                        measure_candidate_stripes(brightest),
-                       brightest.phase_coherence,
                        0,
-                       0};
+                       0,
+                       brightest.is_split_off};
   constexpr double min_duty = 0.1;
   const double duty = std::clamp(light.stripes.duty, min_duty, 1 - min_duty);
   light.peak_level =
@@ -399,13 +392,33 @@ std::optional<BoxSearch> search_box_for_stripes(const ImageView& lines, const Pi
   const CellLevels cells = average_pixels_over_cells(lines, box, background.level, lines_per_bin);
   BoxSearch result{compute_modulation_map(cells, periods), {}};
   const double noise = std::max(min_noise, background.noise);
-  for (ModulatedRegion& region :
-       find_modulated_regions(result.map, compute_min_significant_amplitude(noise, shortest))) {
-    if (region.cells < kMinCells) continue;
-    result.candidates.push_back(examine_region(cells, result.map, std::move(region),
-                                               lamp_periods_lines,
-                                               std::max(kMinPeriod_lines, shortest / 2)));
+  const double min_amplitude = compute_min_significant_amplitude(noise, shortest);
+  const auto examine = [&](ModulatedRegion region) {
+    return examine_region(cells, result.map, std::move(region), lamp_periods_lines,
+                          std::max(kMinPeriod_lines, shortest / 2));
+  };
+  for (ModulatedRegion& region : find_modulated_regions(result.map, min_amplitude)) {
+    if (region.cells >= kMinCells) result.candidates.push_back(examine(std::move(region)));
   }
+  const auto contains = [](const RegionCandidate& candidate, const PixelBox& box) {
+    return 2 * intersect_boxes(candidate.region.box, box).area_px() > box.area_px();
+  };
+  const auto is_out_of_phase = [](const RegionCandidate& candidate) {
+    return candidate.phase_coherence < kMinPhaseCoherence;
+  };
+  if (lamp_periods_lines.empty() || std::ranges::none_of(result.candidates, is_out_of_phase))
+    return result;
+  std::vector<RegionCandidate> parts;
+  for (ModulatedRegion& region : find_modulated_regions(result.map, min_amplitude, true)) {
+    if (region.cells < kMinCells ||
+        std::ranges::none_of(result.candidates, [&](const RegionCandidate& candidate) {
+          return is_out_of_phase(candidate) && contains(candidate, region.box);
+        }))
+      continue;
+    parts.push_back(examine(std::move(region)));
+    parts.back().is_split_off = true;
+  }
+  std::ranges::move(parts, std::back_inserter(result.candidates));
   return result;
 }
 

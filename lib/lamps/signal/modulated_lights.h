@@ -33,15 +33,17 @@ struct ModulatedLight {
   /// Index in `lamp_periods_lines` of the light's period; std::nullopt if none or several are
   /// possible.
   std::optional<std::size_t> lamp;
-  Stripes stripes;  ///< stripes of its brightest part, divided by the envelope
-  /// Phase coherence |sum z| / sum |z| over the cells of its brightest part, see
-  /// find_modulated_lights().
-  double phase_coherence;
+  /// Stripes of its brightest part, divided by the envelope. Their coherence is the phase coherence
+  /// |sum z| / sum |z| over the cells of this part, see find_modulated_lights().
+  Stripes stripes;
   /// Level of its brightest scanlines above the dark level, in gray levels. The fundamental of a
   /// square wave between 0 and this level has the amplitude (2 / pi) sin(pi duty) times the level.
   double peak_level;
   /// Sum of the modulation amplitudes of its cells, in gray levels.
   double energy;
+  /// True if it is a light only if it has an outline: a lit area whose modulation was not found, or
+  /// a part in phase of a region that is out of phase.
+  bool requires_outline;
 };
 
 /// Detects lights in parts of an image by their modulation and assigns them to the periods of the

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
 #include <utility>
 
@@ -20,6 +21,9 @@ constexpr float kMinCellDepth = 0.25F;
 /// Minimum ratio of the amplitude of the saddle to that of the lower maximum at which two maxima
 /// are merged.
 constexpr float kSaddleFraction = 0.6F;
+/// Minimum phase coherence of two maxima that are merged.
+constexpr float kMinCosine = 0.25F;
+constexpr float kMinCoherenceOfMaxima = 0.9F;
 
 /// Values by bin and cell.
 using CellArray = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
@@ -38,38 +42,40 @@ void sum_scanline(const Level* pixels, int width, float* sums, int cells) {
   sums[whole] += float(sum) * float(kCellWidth_px) / float(width - whole * kCellWidth_px);
 }
 
-/// Returns the mean over `length` bins around each bin; values outside are 0.
-CellArray compute_moving_mean(const CellArray& values, double length) {
+/// Returns the mean over `length` bins around each bin `first + i * step`, at most around the last
+/// bin, for `count` values of i; values outside are 0.
+CellArray compute_moving_mean(const CellArray& values, double length, Eigen::Index first,
+                              Eigen::Index step, Eigen::Index count) {
   const Eigen::Index bins = values.rows();
-  CellArray sums = CellArray::Zero(bins + 1, values.cols()), means(bins, values.cols());
+  CellArray sums(bins + 1, values.cols()), means(count, values.cols());
+  sums.row(0).setZero();
   for (Eigen::Index bin = 0; bin < bins; ++bin) {
     sums.row(bin + 1) = sums.row(bin) + values.row(bin);
   }
-  const auto add_integral = [&](Eigen::Index bin, double end, float factor) {
+  struct End {
+    Eigen::Index whole;
+    float fraction;
+  };
+  const auto find_end = [&](double end) {
     const double t = std::clamp(end, 0.0, double(bins));
     const Eigen::Index whole = std::min(static_cast<Eigen::Index>(t), bins - 1);
-    const auto fraction = static_cast<float>(t - double(whole));
-    means.row(bin) += factor * (sums.row(whole) + fraction * values.row(whole));
+    return End{whole, static_cast<float>(t - double(whole))};
   };
-  means.setZero();
-  for (Eigen::Index bin = 0; bin < bins; ++bin) {
-    const double middle = double(bin) + 0.5;
-    add_integral(bin, middle + length / 2, static_cast<float>(1 / length));
-    add_integral(bin, middle - length / 2, static_cast<float>(-1 / length));
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const double middle = double(std::min(first + i * step, bins - 1)) + 0.5;
+    const End low = find_end(middle - length / 2), high = find_end(middle + length / 2);
+    means.row(i) = (sums.row(high.whole) - sums.row(low.whole) +
+                    high.fraction * values.row(high.whole) - low.fraction * values.row(low.whole)) *
+                   static_cast<float>(1 / length);
   }
   return means;
-}
-
-/// Applies the moving mean twice to the levels of the cells, times a factor for each bin.
-CellArray filter_cells(const CellLevels& cells, const Eigen::ArrayXf& factors, double length) {
-  const Eigen::Map<const CellArray> levels(cells.levels.data(), cells.bins, cells.cells);
-  return compute_moving_mean(compute_moving_mean(levels.colwise() * factors, length), length);
 }
 
 /// Watershed of find_modulated_regions().
 class Watershed {
  public:
-  explicit Watershed(const ModulationMap& map) : map_(map), labels_(map.amplitude.size(), kNone) {}
+  Watershed(const ModulationMap& map, bool splits_by_phase)
+      : map_(map), splits_by_phase_(splits_by_phase), labels_(map.amplitude.size(), kNone) {}
 
   /// Adds the next cell; cells have to be added in descending order of amplitude.
   void add(int cell) {
@@ -78,12 +84,20 @@ class Watershed {
     int& label = labels_[std::size_t(cell)];
     if (basin >= 0) {
       label = amplitude >= kBorderFraction * peak(basin) ? basin : kBorder;
+      if (label >= 0 && splits_by_phase_) {
+        sums_[std::size_t(label)] += map_.amplitudes.col(cell);
+        magnitudes_[std::size_t(label)] += map_.amplitudes.col(cell).abs();
+      }
     } else if (beside_border) {
       label = kBorder;
     } else {
       label = static_cast<int>(parents_.size());
       parents_.push_back(label);
       peaks_.push_back(cell);
+      if (splits_by_phase_) {
+        sums_.emplace_back(map_.amplitudes.col(cell));
+        magnitudes_.emplace_back(map_.amplitudes.col(cell).abs());
+      }
     }
   }
 
@@ -98,6 +112,31 @@ class Watershed {
   static constexpr int kNone = -1, kBorder = -2;
 
   float peak(int basin) const { return map_.amplitude[std::size_t(peaks_[std::size_t(basin)])]; }
+  /// Returns true if the cells of both basins are modulated in phase, at the period with the
+  /// largest sum of both.
+  bool are_in_phase(int a, int b) const {
+    if (!splits_by_phase_) return true;
+    const auto i = std::size_t(a), j = std::size_t(b);
+    const Eigen::ArrayXf sum = (sums_[i] + sums_[j]).abs(),
+                         magnitude = magnitudes_[i] + magnitudes_[j];
+    Eigen::Index period;
+    const float largest = sum.maxCoeff(&period);
+    return largest > kMinCoherenceOfMaxima * magnitude[period];
+  }
+  bool is_in_phase(int cell, int basin) const {
+    if (!splits_by_phase_) return true;
+    const auto& sums = sums_[std::size_t(basin)];
+    Eigen::Index period;
+    const float largest = sums.abs().maxCoeff(&period);
+    const auto z = map_.amplitudes(period, cell);
+    return (z * std::conj(sums[period])).real() > kMinCosine * std::abs(z) * largest;
+  }
+  void merge(int from, int into) {
+    parents_[std::size_t(from)] = into;
+    if (!splits_by_phase_) return;
+    sums_[std::size_t(into)] += sums_[std::size_t(from)];
+    magnitudes_[std::size_t(into)] += magnitudes_[std::size_t(from)];
+  }
   int find_root(int label) {
     while (parents_[std::size_t(label)] != label) label = parents_[std::size_t(label)];
     return label;
@@ -115,13 +154,15 @@ class Watershed {
         beside_border = beside_border || label == kBorder;
         if (label < 0) continue;
         const int other = find_root(label);
+        if (!is_in_phase(cell, other)) continue;
         if (basin < 0 || other == basin) {
           basin = other;
           continue;
         }
         const auto [lower, higher] =
             peak(other) < peak(basin) ? std::pair(other, basin) : std::pair(basin, other);
-        if (amplitude >= kSaddleFraction * peak(lower)) parents_[std::size_t(lower)] = higher;
+        if (amplitude >= kSaddleFraction * peak(lower) && are_in_phase(lower, higher))
+          merge(lower, higher);
         basin = higher;
       }
     }
@@ -129,7 +170,11 @@ class Watershed {
   }
 
   const ModulationMap& map_;
+  bool splits_by_phase_;
   std::vector<int> labels_, parents_, peaks_;
+  /// Sums of the complex amplitudes of a basin, and of their magnitudes, by period.
+  std::vector<Eigen::ArrayXcf> sums_;
+  std::vector<Eigen::ArrayXf> magnitudes_;
 };
 
 void add_cell(const ModulationMap& map, int step, int cell, ModulatedRegion& region) {
@@ -178,24 +223,33 @@ ModulationMap compute_modulation_map(const CellLevels& cells,
                     (cells.bins + kBinsPerStep - 1) / kBinsPerStep,
                     kBinsPerStep * cells.lines_per_bin,
                     {},
+                    {},
                     {}};
   map.amplitude.assign(map.modulation_cell_index(map.steps, 0), 0);
   map.mean.assign(map.amplitude.size(), 0);
-  const Eigen::ArrayXf bins = Eigen::ArrayXf::LinSpaced(cells.bins, 0, float(cells.bins - 1));
-  for (const double period_lines : periods_lines) {
-    const double period = period_lines / cells.lines_per_bin;
-    const Eigen::ArrayXf angles = (bins + 0.5F) * float(2 * std::numbers::pi / period);
-    const CellArray real = filter_cells(cells, angles.cos(), period);
-    const CellArray imaginary = filter_cells(cells, angles.sin(), period);
-    const CellArray mean = filter_cells(cells, Eigen::ArrayXf::Ones(cells.bins), period);
+  map.amplitudes.resize(Eigen::Index(periods_lines.size()), Eigen::Index(map.amplitude.size()));
+  // Levels times cosine, times sine, and the levels themselves, side by side.
+  const Eigen::Index count = cells.cells;
+  CellArray products(cells.bins, 3 * count);
+  products.rightCols(count) = Eigen::Map<const CellArray>(cells.levels.data(), cells.bins, count);
+  const Eigen::ArrayXf bins = Eigen::ArrayXf::LinSpaced(cells.bins, 0.5F, float(cells.bins) - 0.5F);
+  for (std::size_t i = 0; i < periods_lines.size(); ++i) {
+    const double period = periods_lines[i] / cells.lines_per_bin;
+    const Eigen::ArrayXf angles = bins * float(2 * std::numbers::pi / period);
+    products.leftCols(count) = products.rightCols(count).colwise() * angles.cos();
+    products.middleCols(count, count) = products.rightCols(count).colwise() * angles.sin();
+    const CellArray filtered =
+        compute_moving_mean(compute_moving_mean(products, period, 0, 1, cells.bins), period,
+                            kBinsPerStep / 2, kBinsPerStep, map.steps);
     for (int step = 0; step < map.steps; ++step) {
-      const int bin = std::min(step * kBinsPerStep + kBinsPerStep / 2, cells.bins - 1);
       for (int cell = 0; cell < map.cells; ++cell) {
         const std::size_t k = map.modulation_cell_index(step, cell);
-        const float amplitude = 2 * std::hypot(real(bin, cell), imaginary(bin, cell));
+        const std::complex<float> z(2 * filtered(step, cell), 2 * filtered(step, count + cell));
+        map.amplitudes(Eigen::Index(i), Eigen::Index(k)) = z;
+        const float amplitude = std::sqrt(std::norm(z));
         if (amplitude <= map.amplitude[k]) continue;
         map.amplitude[k] = amplitude;
-        map.mean[k] = mean(bin, cell);
+        map.mean[k] = filtered(step, 2 * count + cell);
       }
     }
   }
@@ -207,8 +261,8 @@ double compute_min_significant_amplitude(double noise, double period_lines) {
   return std::sqrt(-std::log(kFalseAlarmRate) * mean_square);
 }
 
-std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map,
-                                                    double min_amplitude) {
+std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map, double min_amplitude,
+                                                    bool splits_by_phase) {
   std::vector<int> order;
   for (std::size_t i = 0; i < map.amplitude.size(); ++i) {
     const float amplitude = map.amplitude[i];
@@ -221,7 +275,7 @@ std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map,
                 amplitude_b = map.amplitude[std::size_t(b)];
     return amplitude_a != amplitude_b ? amplitude_a > amplitude_b : a < b;
   });
-  Watershed watershed(map);
+  Watershed watershed(map, splits_by_phase);
   for (const int cell : order) watershed.add(cell);
   std::vector<int> region_indices(watershed.size(), -1);
   std::vector<ModulatedRegion> regions;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <span>
 #include <vector>
 
@@ -39,6 +40,8 @@ struct ModulationMap {
   /// Largest amplitude over all periods, and the mean level around it, in gray levels, by step and
   /// cell.
   std::vector<float> amplitude, mean;
+  /// Complex amplitudes by period (row), and step and cell (column).
+  Eigen::ArrayXXcf amplitudes;
 
   /// Returns the middle of a step's bin, as a scanline of the image.
   double middle_scanline_of_step(int step) const {
@@ -86,6 +89,11 @@ struct ModulatedRegion {
 /// level. A region ends where the amplitude falls below kBorderFraction of its maximum. Darker
 /// cells are light that the lamp casts on its surroundings, or belong to another maximum. Two
 /// maxima are merged if the saddle between them is above 60 % of the lower one.
-std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map, double min_amplitude);
+///
+/// @param splits_by_phase  true: cells are only joined to a region in phase with it, at the period
+///        with the largest sum of its complex amplitudes. This separates lamps that touch, and cuts
+///        patterns into pieces.
+std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map, double min_amplitude,
+                                                    bool splits_by_phase = false);
 
 }  // namespace vlp

@@ -45,6 +45,10 @@ PeriodFit fit_periodic_signal(const LineProfile& profile, double period_lines);
 /// for each scanline with sufficient light; the brightest are about 1 / duty.
 std::vector<double> divide_profile_by_envelope(const LineProfile& profile, double period_lines);
 
+/// Fits all periods that differ from `period_lines` by at most the fraction `max_drift`, and
+/// returns the best fit.
+PeriodFit fit_period_near(const LineProfile& profile, double period_lines, double max_drift);
+
 /// Fits all periods from `min_period_lines` up to that of which the profile shows 1.3 periods, and
 /// returns the best fit. Skips periods of less than a hundredth of the profile.
 PeriodFit find_best_fitting_period(const LineProfile& profile, double min_period_lines);

@@ -48,6 +48,9 @@ struct Stripes {
   double periods;
   /// True if the begins and ends of all stripes agree with the period.
   bool is_regular;
+  /// Result of compute_stripe_coherence_between_parts(), or the phase coherence of a modulated
+  /// light; 0 if it was not measured.
+  double coherence;
   /// Number of stripes per scanline: half of the number of begins and ends divided by the number of
   /// scanlines. The signal crosses the middle between dark and bright there.
   double count_per_line;

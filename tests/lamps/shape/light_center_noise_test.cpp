@@ -11,7 +11,6 @@
 #include "camera/lens.h"
 #include "geometry/angles.h"
 #include "lamps/rendered_captures.h"
-#include "lamps/shape/robust_ellipse.h"
 
 namespace vlp {
 namespace {
@@ -41,17 +40,26 @@ std::optional<DiscProjection> project_disc(const Lens& lens, double tilt_rad,
     if (!pixel) return std::nullopt;
     rim.push_back(*pixel);
   }
-  const std::vector<double> weights(rim.size(), 1);
-  const auto fit = fit_robust_ellipse(rim, weights, 0.35);
   const auto center = project_to_pixel(place);
-  if (!fit || !center) return std::nullopt;
-  return DiscProjection{fit->center - *center, fit->center,
-                        std::sqrt(fit->rim_from_circle.determinant())};
+  if (!center) return std::nullopt;
+  // Conic a x^2 + b x y + c y^2 + d x + e y = 1 about the projected center.
+  Eigen::MatrixXd rows(static_cast<Eigen::Index>(rim.size()), 5);
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    const Eigen::Vector2d at = rim[static_cast<std::size_t>(i)] - *center;
+    rows.row(i) << at.x() * at.x(), at.x() * at.y(), at.y() * at.y(), at.x(), at.y();
+  }
+  const Eigen::VectorXd conic =
+      rows.colPivHouseholderQr().solve(Eigen::VectorXd::Ones(rows.rows()));
+  Eigen::Matrix2d square;
+  square << conic[0], conic[1] / 2, conic[1] / 2, conic[2];
+  const Eigen::Vector2d shift = -square.inverse() * conic.tail<2>() / 2;
+  const double scale = 1 + shift.dot(square * shift);
+  return DiscProjection{shift, *center + shift, std::sqrt(scale / std::sqrt(square.determinant()))};
 }
 
 /// Returns the bound on the shift: the standard deviation is per axis.
 double bound_px(const DiscProjection& disc) {
-  Light light{};
+  MeasuredLight light{};
   light.pixel = disc.pixel;
   light.radius_px = disc.radius_px;
   return std::numbers::sqrt2 * predict_center_sd_without_lens_px(light, kUnknownLensImage);
@@ -96,7 +104,7 @@ TEST(PredictCenterSdWithoutLens, BoundsCenterShiftOfTiltedPinholeCamera) {
 }
 
 TEST(PredictCenterSdWithoutLens, IncreasesWithRadiusAndDistanceFromImageCenter) {
-  Light light{};
+  MeasuredLight light{};
   light.pixel = {399.5, 299.5};
   light.radius_px = 30;
   const double in_the_middle = predict_center_sd_without_lens_px(light, kUnknownLensImage);
@@ -105,7 +113,7 @@ TEST(PredictCenterSdWithoutLens, IncreasesWithRadiusAndDistanceFromImageCenter) 
   EXPECT_GT(off_axis, 3 * in_the_middle);
   light.radius_px = 60;
   EXPECT_DOUBLE_EQ(predict_center_sd_without_lens_px(light, kUnknownLensImage), 4 * off_axis);
-  light.shape = ShapeKind::rectangle;
+  light.outline_kind = LightOutline::rectangle;
   EXPECT_EQ(predict_center_sd_without_lens_px(light, kUnknownLensImage), 0)
       << "a rectangle's edges say it";
 }

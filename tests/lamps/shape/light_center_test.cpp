@@ -7,7 +7,10 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <vector>
 
+#include "geometry/circle_fit.h"
 #include "geometry/plane.h"
 #include "lamps/shape/outline_equations.h"
 #include "support/matchers.h"
@@ -24,9 +27,9 @@ class LightShapeOfMovingDisc : public testing::Test {
       : shape(camera), center_px(shape.pixel_from_level_plane_point(circle.center).value()) {}
 
   /// Returns the rim with each point at its position when its scanline is read: at d + m (l - l_c).
-  std::vector<EdgePoint> outline(const Vector2d& motion_per_line) const {
+  std::vector<Vector2d> outline(const Vector2d& motion_per_line) const {
     constexpr int count = 120;
-    std::vector<EdgePoint> points;
+    std::vector<Vector2d> points;
     for (int i = 0; i < count; ++i) {
       const double angle = 2 * std::numbers::pi * i / count;
       const Vector2d rim =
@@ -37,22 +40,24 @@ class LightShapeOfMovingDisc : public testing::Test {
             shape.pixel_from_level_plane_point(rim + (pixel.y() - center_px.y()) * motion_per_line)
                 .value();
       }
-      points.push_back({pixel, 100, 1, pixel.x() < center_px.x()});
+      points.push_back(pixel);
     }
     return points;
   }
 
   /// Fits a circle to the rim, and the normal equations for its ovality.
-  std::optional<Light> fit_light(const Vector2d& motion_per_line) const {
-    const auto points = outline(motion_per_line);
-    auto light = shape.fit_light_to_outline(points, dark);
-    if (!light) return light;
+  std::optional<MeasuredLight> fit_light(const Vector2d& motion_per_line) const {
     std::vector<Vector2d> in_plane;
-    for (const EdgePoint& point : points)
-      in_plane.push_back(shape.level_plane_point_from_pixel(point.pixel).value());
-    const Circle fitted{light->plane_outline.center, light->plane_outline.radius()};
-    light->outline_equations = make_outline_equations(
-        in_plane, fitted, shape.compute_scanline_gradient_wrt_position(fitted), 1e-3);
+    for (const Vector2d& pixel : outline(motion_per_line))
+      in_plane.push_back(shape.level_plane_point_from_pixel(pixel).value());
+    const auto fit = fit_circle(in_plane);
+    MeasuredLight light{};
+    if (!fit ||
+        !shape.set_outline_of_light({fit->circle.center, Matrix2::Identity() / fit->circle.radius},
+                                    600 * fit->circle.radius, light))
+      return std::nullopt;
+    light.outline_equations = make_outline_equations(
+        in_plane, fit->circle, shape.compute_scanline_gradient_wrt_position(fit->circle), 1e-3);
     return light;
   }
 
@@ -61,7 +66,6 @@ class LightShapeOfMovingDisc : public testing::Test {
   LightShape shape;
   Circle circle{{0.35, 0.3}, 0.12};
   Vector2d center_px;
-  Background dark{0, 1, 5};
 };
 
 TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRow) {
@@ -71,7 +75,7 @@ TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRo
     auto light = fit_light(motion);
     ASSERT_TRUE(light);
     const Vector2d oval = complex_product(light->outline_equations->scanline_gradient, motion) / 2;
-    Light unshifted = *light;
+    MeasuredLight unshifted = *light;
     shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
     shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),
                                    unshifted);

@@ -150,7 +150,7 @@ TEST(FitDiscOutline, EquationsContainOvalityOfEllipse) {
   const auto fit = fit_disc_outline(view, {{0, 0}, Matrix2::Identity() * 600 / 40}, 0.9, 0,
                                     estimate_image_background(view), shape);
   ASSERT_TRUE(fit);
-  Light light{};
+  MeasuredLight light{};
   ASSERT_TRUE(set_fitted_outline(*fit, shape, light));
   ASSERT_TRUE(light.outline_equations);
   const auto estimate = light.outline_equations->solve_with_oval_prior(std::nullopt);

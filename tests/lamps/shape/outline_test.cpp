@@ -59,30 +59,5 @@ TEST(FindBlobOutline, ReturnsNoPointsAtImageBorderForCutDisc) {
   EXPECT_TRUE(outline_in(cv::Mat(160, 200, CV_8U, cv::Scalar(9))).empty());
 }
 
-TEST(SelectOutermostEdgePoints, ExcludesEdgesOfOccludingBar) {
-  const DrawnDisc disc{.dark_columns = {95, 96, 97, 98, 99, 100}};
-  const auto all = outline_in(disc.image(CV_16U));
-  EXPECT_GT(worst_off(disc, all, 0), 10);
-  const auto points = select_outermost_edge_points(all);
-  EXPECT_GT(points.size(), 120U);
-  EXPECT_LT(worst_off(disc, points, kSteep), 0.05);
-}
-
-TEST(SelectOutermostEdgePoints, ReturnsFirstBeginAndLastEndOfEachRow) {
-  const auto points = select_outermost_edge_points({{{30, 5}, 1, 1, false},
-                                                    {{20, 4}, 1, 1, true},
-                                                    {{12, 5}, 1, 1, true},
-                                                    {{40, 5}, 1, 1, false},
-                                                    {{32, 5}, 1, 1, true},
-                                                    {{60, 6}, 1, 1, false}});
-  const auto is = [](double column, double row, bool begins) {
-    return testing::AllOf(testing::Field(&EdgePoint::pixel, Vector2d(column, row)),
-                          testing::Field(&EdgePoint::is_run_begin, begins));
-  };
-  EXPECT_THAT(points, testing::ElementsAre(is(20, 4, true), is(12, 5, true), is(40, 5, false),
-                                           is(60, 6, false)));
-  EXPECT_TRUE(select_outermost_edge_points({}).empty());
-}
-
 }  // namespace
 }  // namespace vlp

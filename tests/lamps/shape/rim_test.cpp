@@ -30,8 +30,8 @@ Blob largest_blob(const ImageView& image, const Background& background) {
 }
 
 /// Fits the rim of the largest light of an image.
-std::optional<Light> rim_in(const cv::Mat& pixels, double period_lines,
-                            const std::optional<KnownRadius>& radius = {}) {
+std::optional<MeasuredLight> rim_in(const cv::Mat& pixels, double period_lines,
+                                    const std::optional<KnownRadius>& radius = {}) {
   const ImageView image = to_image_view(pixels);
   const Background background = estimate_image_background(image);
   return fit_rim_of_light(image, largest_blob(image, background), period_lines, background,
@@ -70,7 +70,6 @@ TEST(FitRimOfLight, CenterAndRadiusMatchDownlightForAllCorePositions) {
     const auto rim =
         rim_in(render_lamps({lamp}, kSize, depth, noise, seed), lamp.stripes.period_lines);
     ASSERT_TRUE(rim);
-    EXPECT_TRUE(rim->is_uneven);
     EXPECT_NEAR(rim->radius_px, lamp.radius_px, 1);
     const double error_px = (rim->pixel - lamp.center).norm();
     worst_px = std::max(worst_px, error_px);
@@ -185,7 +184,7 @@ TEST(LightDetector, IdentifiesDownlightsOnlyWithReliableNumberOfPeriods) {
       ++identified;
     }
     // The period is measured with an envelope that decreases to a tenth within two periods.
-    EXPECT_NEAR(lights[0].stripes.period_lines / lamp.stripes.period_lines, 1, kLampDrift);
+    EXPECT_NEAR(lights[0].stripes.period_lines / lamp.stripes.period_lines, 1, 2 * kLampDrift);
     EXPECT_LT((lights[0].pixel - lamp.center).norm(), 1);
   });
   EXPECT_GT(identified, 0);
@@ -234,30 +233,13 @@ TEST(FitRimOfLight, ReturnsClearRimWithCenterOfDisc) {
   ASSERT_TRUE(rim);
   EXPECT_LT((rim->pixel - disc.center).norm(), 0.2);
   EXPECT_EQ(rim->outline.size(), 64U);
-  for (const EdgePoint& point : rim->outline)
-    EXPECT_NEAR((point.pixel - disc.center).norm(), disc.radius_px, 0.5);
+  for (const Eigen::Vector2d& at : rim->outline)
+    EXPECT_NEAR((at - disc.center).norm(), disc.radius_px, 0.5);
 }
 
 TEST(FitRimOfLight, ReturnsNulloptForSmallBlob) {
   const DrawnLamp speck{.center = {151.3, 139.6}, .radius_px = 8};
   EXPECT_FALSE(rim_in(render_lamps({speck}, kSize, CV_8U), 0));
-}
-
-TEST(IsBlobUnevenlyLit, ReturnsTrueForDownlightsAndFalseForDiscs) {
-  const auto is_uneven = [](const DrawnLamp& lamp, int depth) {
-    const cv::Mat pixels = render_lamps({lamp}, kSize, depth, 1);
-    const ImageView image = to_image_view(pixels);
-    const Background background = estimate_image_background(image);
-    const Blob blob = largest_blob(image, background);
-    return is_blob_unevenly_lit(image, blob, find_blob_outline(image, blob, background),
-                                background);
-  };
-  for (const int depth : {CV_8U, CV_16U}) {
-    EXPECT_TRUE(is_uneven(downlight(0.2, 17), depth));
-    EXPECT_FALSE(is_uneven({.center = {151.3, 139.6}, .radius_px = 50.7}, depth));
-  }
-  EXPECT_FALSE(is_blob_unevenly_lit(to_image_view(cv::Mat1b(20, 20)), Blob{{{3, 2, 9}}}, {},
-                                    Background{0, 1, 5}));
 }
 
 }  // namespace

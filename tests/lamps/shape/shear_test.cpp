@@ -7,8 +7,8 @@
 #include <numbers>
 
 #include "geometry/arc.h"
+#include "geometry/circle_fit.h"
 #include "lamps/shape/outline_equations.h"
-#include "lamps/shape/robust_ellipse.h"
 #include "support/matchers.h"
 #include "support/random.h"
 
@@ -40,9 +40,7 @@ class MovingCamera {
     Points points = read_line_by_line(arc({center, kRadius}, 0.4, 0.4 + angle_rad, 90), center,
                                       motion_at(center));
     for (Vector2d& point : points) point += noise * Vector2d(random.normal(), random.normal());
-    const std::vector<double> weights(points.size(), 1);
-    return make_outline_equations(points, fit_robust_circle(points, weights, 1e-3)->to_circle(),
-                                  kLineSlope, noise / kRadius);
+    return make_outline_equations(points, fit_circle(points)->circle, kLineSlope, noise / kRadius);
   }
 
   Vector2d v{2.0e-5, -1.5e-5};
