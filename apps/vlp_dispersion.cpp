@@ -96,8 +96,7 @@ void run(const CLI::App& app, Options options) {
   throw_if_step_failed(found);
   if (!options.plot.empty()) write_plot(options.plot, found.drawing());
   write_calibration(options.images.output, found.calibration);
-  print_dispersion_calibration(found.fit, input.calibration.camera.focal_px(),
-                               places.captures.size());
+  print_dispersion_calibration(found.fit, found.calibration, places.captures.size());
 }
 
 }  // namespace

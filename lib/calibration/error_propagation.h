@@ -9,8 +9,7 @@
 #include "geometry/types.h"
 
 /// Propagation of errors from earlier calibration steps, which a step assumes to be exact, to its
-/// result. Used for jacobian_wrt_intrinsics, jacobian_wrt_zenith and similar members of
-/// RotationCenter and Dispersion.
+/// result (JointCovariance).
 namespace vlp {
 
 /// Function that solves for a vector of unknowns with the errors `error` added to the assumed

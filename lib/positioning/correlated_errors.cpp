@@ -10,7 +10,6 @@
 
 #include "geometry/symmetric.h"
 #include "rig/calibration_error.h"
-#include "rig/find_lamp.h"
 
 namespace vlp {
 namespace {
@@ -56,28 +55,6 @@ Eigen::MatrixXd compute_posterior_covariance(const Eigen::MatrixXd& covariance, 
   return known;
 }
 
-/// Converts a covariance in px^2 to units of the normalized plane.
-Eigen::Matrix2d convert_covariance_to_normalized_plane(const std::optional<Matrix2>& covariance_px,
-                                                       const Eigen::Vector2d& focal_px) {
-  if (!covariance_px) return Eigen::Matrix2d::Zero();
-  const Eigen::Vector2d inverse = focal_px.cwiseInverse();
-  return inverse.asDiagonal() * *covariance_px * inverse.asDiagonal();
-}
-
-/// Returns true if the lamp of a map has this place, to 1 um.
-bool is_lamp_at_position(const Lamp& lamp, const Eigen::Vector3d& position_m) {
-  constexpr double tolerance_m = 1e-6;
-  return (position_m - lamp.position_m).norm() < tolerance_m;
-}
-
-/// Returns the place of a lamp in an adjustment or a dispersion; nullptr if it is not in it.
-template <typename Place>
-const Place* find_lamp_position_by_id(const std::vector<Place>& places, int id) {
-  const auto place =
-      std::find_if(places.begin(), places.end(), [&](const Place& one) { return one.id == id; });
-  return place == places.end() ? nullptr : &*place;
-}
-
 }  // namespace
 
 CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
@@ -96,42 +73,69 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
     add_rotation_derivatives(rotation_derivatives_, calibration, correction,
                              add_error_to_calibrated_dispersion_offset);
   offset_ = intrinsics_ + (turned ? 2 : 0);
-  assign_covariance_rows_to_lamps(lamps, calibration);
-  set_lens_and_zenith_covariances(calibration);
-  set_lamp_covariances(lamps, calibration.adjustment);
-  if (turned || shifted) propagate_errors_to_zenith_and_offset(lamps, calibration);
+  const JointCovariance none, &joint = calibration.covariance ? *calibration.covariance : none;
+  const std::vector<Eigen::Index> rows = assign_covariance_rows(lamps, joint);
+  const auto is_known = [&](Eigen::Index row) { return rows[static_cast<std::size_t>(row)] >= 0; };
+  const Eigen::Index size = std::ssize(rows);
+  covariance_ = Eigen::MatrixXd::Zero(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    for (Eigen::Index k = 0; is_known(i) && k < size; ++k) {
+      if (is_known(k)) {
+        covariance_(i, k) =
+            joint.matrix(rows[static_cast<std::size_t>(i)], rows[static_cast<std::size_t>(k)]);
+      }
+    }
+  }
+  if (turned && shifted && !is_known(offset_)) {
+    // An offset without a covariance compensates the error of the zenith.
+    covariance_.middleRows<2>(offset_) = -covariance_.middleRows<2>(intrinsics_);
+    covariance_.middleCols<2>(offset_) = -covariance_.middleCols<2>(intrinsics_);
+  }
+  // Steps that were calibrated with the lens compensate its errors in part: without their joint
+  // covariance these would count twice.
+  const auto& report = calibration.intrinsics_report;
+  const bool is_lens_alone = !turned && !shifted && report && report->covariance;
+  if (is_lens_alone && !is_known(0))
+    covariance_.topLeftCorner(intrinsics_, intrinsics_) = *report->covariance;
+  const bool is_adjusted = calibration.adjustment.has_value();
+  if (!is_adjusted) num_lamps_moved_since_calibration_ = 0;
+  part_stated_ = {is_adjusted || is_lens_alone || is_known(0),
+                  is_adjusted || (turned && is_known(intrinsics_)), !shifted || is_known(offset_),
+                  std::ranges::all_of(lamps_, &LampErrors::is_known)};
+  complete_ = part_stated_[0] && part_stated_[1] && part_stated_[3];
   stated_ =
-      calibration.adjustment || covariance_.diagonal().maxCoeff() > 0 ||
+      is_adjusted || covariance_.diagonal().maxCoeff() > 0 ||
       std::ranges::any_of(lamps_, [](const LampErrors& lamp) { return lamp.variance_m2 > 0; });
 }
 
-void CommonErrors::assign_covariance_rows_to_lamps(std::span<const Lamp> lamps,
-                                                   const Calibration& calibration) {
-  const auto is_correlated = [&](const Lamp& lamp) {
-    const auto* adjusted = calibration.adjustment
-                               ? find_lamp_position_by_id(calibration.adjustment->lamps, lamp.id)
-                               : nullptr;
-    if (adjusted != nullptr && is_lamp_at_position(lamp, adjusted->position_m)) return true;
-    const auto* uncertain =
-        has_dispersion_offset_errors()
-            ? find_lamp_position_by_id(calibration.dispersion->uncertain_lamps, lamp.id)
-            : nullptr;
-    return uncertain != nullptr && is_lamp_at_position(lamp, uncertain->position_m);
+std::vector<Eigen::Index> CommonErrors::assign_covariance_rows(std::span<const Lamp> lamps,
+                                                               const JointCovariance& joint) {
+  std::vector<Eigen::Index> rows(static_cast<std::size_t>(num_shared_errors()), -1);
+  const auto set_rows = [&](Eigen::Index first, Eigen::Index size, std::string_view parameter) {
+    const auto row = joint.find_row(parameter);
+    for (Eigen::Index i = 0; row && i < size; ++i)
+      rows[static_cast<std::size_t>(first + i)] = *row + i;
   };
-  lamps_.resize(lamps.size());
-  Eigen::Index size = num_shared_errors();
-  for (std::size_t i = 0; i < lamps.size(); ++i) {
-    if (!is_correlated(lamps[i])) continue;
-    lamps_[i].row = size;
-    size += 3;
+  set_rows(0, intrinsics_, "fx");
+  if (has_zenith_errors()) set_rows(intrinsics_, 2, kZenithParameter);
+  if (has_dispersion_offset_errors()) set_rows(offset_, 2, kOffsetParameter);
+  for (const Lamp& lamp : lamps) {
+    LampErrors& errors = lamps_.emplace_back(
+        LampErrors{{}, std::pow(lamp.sd_m.value_or(0), 2), lamp.sd_m.has_value()});
+    if (const auto row = joint.find_lamp_row(lamp.id, lamp.position_m)) {
+      errors = {std::ssize(rows), 0, true};
+      for (Eigen::Index k = 0; k < 3; ++k) rows.push_back(*row + k);
+    } else if (std::ranges::count(joint.lamps, lamp.id, &JointCovariance::LampPosition::id) > 0) {
+      ++num_lamps_moved_since_calibration_;
+    }
   }
-  covariance_ = Eigen::MatrixXd::Zero(size, size);
+  return rows;
 }
 
 Eigen::Matrix3d CommonErrors::lamp_position_covariance(std::size_t lamp) const {
-  const auto& [row, variance_m2] = lamps_[lamp];
-  if (!row) return variance_m2 * Eigen::Matrix3d::Identity();
-  return covariance_.block<3, 3>(*row, *row);
+  const LampErrors& errors = lamps_[lamp];
+  if (!errors.row) return errors.variance_m2 * Eigen::Matrix3d::Identity();
+  return covariance_.block<3, 3>(*errors.row, *errors.row);
 }
 
 Eigen::Matrix3d CommonErrors::lamp_cross_covariance(std::size_t lamp, std::size_t other) const {
@@ -139,114 +143,6 @@ Eigen::Matrix3d CommonErrors::lamp_cross_covariance(std::size_t lamp, std::size_
   const auto &row = lamps_[lamp].row, &column = lamps_[other].row;
   if (!row || !column) return Eigen::Matrix3d::Zero();
   return covariance_.block<3, 3>(*row, *column);
-}
-
-void CommonErrors::set_lens_and_zenith_covariances(const Calibration& calibration) {
-  const auto& center = calibration.rotation_center;
-  const auto& dispersion = calibration.dispersion;
-  const auto& adjustment = calibration.adjustment;
-  const auto& report = calibration.intrinsics_report;
-  // A part that was calibrated with the lens compensates its errors in part: without
-  // jacobian_wrt_intrinsics these would count twice.
-  const bool lens_counts_once = has_zenith_errors() ? center->jacobian_wrt_intrinsics.has_value()
-                                : has_dispersion_offset_errors()
-                                    ? dispersion->jacobian_wrt_intrinsics.has_value()
-                                    : true;
-  const bool lens = report && report->covariance && lens_counts_once;
-  const bool zenith_stated = adjustment || (has_zenith_errors() && center->covariance);
-  complete_ = adjustment || (lens && zenith_stated);
-  part_stated_ = {adjustment || lens, zenith_stated,
-                  !has_dispersion_offset_errors() || dispersion->covariance.has_value(), true};
-  if (lens && !adjustment) {
-    covariance_.topLeftCorner(intrinsics_, intrinsics_) = *report->covariance;
-  }
-  if (has_zenith_errors() && !adjustment) {
-    covariance_.block<2, 2>(intrinsics_, intrinsics_) =
-        convert_covariance_to_normalized_plane(center->covariance, calibration.camera.focal_px());
-  }
-}
-
-void CommonErrors::set_lamp_covariances(std::span<const Lamp> lamps,
-                                        const std::optional<Adjustment>& adjustment) {
-  // Pairs of a row here and the same row of the adjustment's covariance.
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> adjusted;
-  if (adjustment) {
-    for (Eigen::Index i = 0; i < offset_; ++i) adjusted.emplace_back(i, i);
-  }
-  for (std::size_t i = 0; i < lamps.size(); ++i) {
-    const auto& row = lamps_[i].row;
-    const auto* place =
-        adjustment ? find_lamp_position_by_id(adjustment->lamps, lamps[i].id) : nullptr;
-    if (place != nullptr && is_lamp_at_position(lamps[i], place->position_m)) {
-      const Eigen::Index from = intrinsics_ + 4 + 3 * (place - adjustment->lamps.data());
-      for (Eigen::Index k = 0; k < 3; ++k) adjusted.emplace_back(*row + k, from + k);
-      continue;
-    }
-    if (place != nullptr) ++num_lamps_moved_since_calibration_;
-    if (!lamps[i].sd_m) {
-      complete_ = part_stated_.back() = false;
-      continue;
-    }
-    const double variance_m2 = *lamps[i].sd_m * *lamps[i].sd_m;
-    if (row) {
-      covariance_.block<3, 3>(*row, *row) = variance_m2 * Eigen::Matrix3d::Identity();
-    } else {
-      lamps_[i].variance_m2 = variance_m2;
-    }
-  }
-  for (const auto& [row, from_row] : adjusted) {
-    for (const auto& [col, from_col] : adjusted) {
-      covariance_(row, col) = adjustment->covariance(from_row, from_col);
-    }
-  }
-}
-
-void CommonErrors::propagate_errors_to_zenith_and_offset(std::span<const Lamp> lamps,
-                                                         const Calibration& calibration) {
-  const Eigen::Index rows = num_shared_errors() - intrinsics_;
-  // Derivatives of zenith and offset by independent errors: lens, the zenith's step, the offset's
-  // step, lamps.
-  Eigen::MatrixXd derivatives = Eigen::MatrixXd::Zero(rows, covariance_.cols());
-  derivatives.middleCols(intrinsics_, rows).setIdentity();
-  if (has_zenith_errors() && !calibration.adjustment &&
-      calibration.rotation_center->jacobian_wrt_intrinsics) {
-    derivatives.topLeftCorner(2, intrinsics_) =
-        *calibration.rotation_center->jacobian_wrt_intrinsics;
-  }
-  if (has_dispersion_offset_errors()) {
-    const Dispersion& dispersion = *calibration.dispersion;
-    covariance_.block<2, 2>(offset_, offset_) = convert_covariance_to_normalized_plane(
-        dispersion.covariance, calibration.camera.focal_px());
-    auto of_offset = derivatives.bottomRows<2>();
-    if (dispersion.jacobian_wrt_intrinsics)
-      of_offset.leftCols(intrinsics_) = *dispersion.jacobian_wrt_intrinsics;
-    for (const Dispersion::UncertainLamp& uncertain : dispersion.uncertain_lamps) {
-      if (const auto row = find_covariance_row_of_lamp(lamps, uncertain)) {
-        of_offset.middleCols<3>(*row) = uncertain.jacobian_wrt_position;
-      } else {
-        const Eigen::Matrix<double, 2, 3> move = uncertain.sd_m * uncertain.jacobian_wrt_position;
-        covariance_.block<2, 2>(offset_, offset_) += move * move.transpose();
-      }
-    }
-    if (has_zenith_errors()) {
-      // The offset compensates the error of the zenith.
-      const Eigen::Matrix2d jacobian_wrt_zenith =
-          dispersion.jacobian_wrt_zenith ? Eigen::Matrix2d(*dispersion.jacobian_wrt_zenith)
-                                         : Eigen::Matrix2d(-Eigen::Matrix2d::Identity());
-      of_offset += jacobian_wrt_zenith * Eigen::MatrixXd(derivatives.topRows<2>());
-    }
-  }
-  covariance_.middleRows(intrinsics_, rows) = derivatives * covariance_;
-  covariance_.middleCols(intrinsics_, rows) = covariance_ * derivatives.transpose();
-}
-
-std::optional<Eigen::Index> CommonErrors::find_covariance_row_of_lamp(
-    std::span<const Lamp> lamps, const Dispersion::UncertainLamp& uncertain) const {
-  const Lamp* lamp = find_lamp_by_id(lamps, uncertain.id);
-  if (lamp == nullptr || !is_lamp_at_position(*lamp, uncertain.position_m)) return std::nullopt;
-  const auto row = lamps_[static_cast<std::size_t>(lamp - lamps.data())].row;
-  const bool is_stated = lamp->sd_m || covariance_.block<3, 3>(*row, *row).trace() > 0;
-  return is_stated ? row : std::nullopt;
 }
 
 CommonErrors CommonErrors::isolate_error_source(CommonErrorSource part) const {
@@ -382,46 +278,5 @@ template CommonErrors::GainMatrix<kBodyStates> CommonErrors::compute_gain_from_e
 template Matrix4 CommonErrors::propagate_covariance_to_fix(const GainMatrix<4>& gain) const;
 template BodyCovariance CommonErrors::propagate_covariance_to_fix(
     const GainMatrix<kBodyStates>& gain) const;
-
-namespace {
-
-/// Returns true if the calibration reports errors of its lens that `errors` lacks.
-bool lacks_lens_covariance(const CommonErrors& errors, const Calibration& calibration) {
-  const auto& report = calibration.intrinsics_report;
-  return report && report->covariance &&
-         !errors.is_error_source_known_or_absent(CommonErrorSource::lens);
-}
-
-}  // namespace
-
-std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration) {
-  const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.is_error_source_known_or_absent(CommonErrorSource::zenith) ||
-      lacks_lens_covariance(errors, calibration))
-    return std::nullopt;
-  const Eigen::Index zenith = count_intrinsics_with_covariance(calibration.camera);
-  return Matrix2(errors.joint_error_covariance().block<2, 2>(zenith, zenith));
-}
-
-std::optional<Matrix2> compute_dispersion_offset_covariance(const Calibration& calibration) {
-  const CommonErrors errors({}, calibration, Correction::all);
-  if (!errors.is_error_source_known_or_absent(CommonErrorSource::offset) ||
-      lacks_lens_covariance(errors, calibration))
-    return std::nullopt;
-  if (!calibration.adjustment) {
-    const Dispersion& dispersion = *calibration.dispersion;
-    const auto& report = calibration.intrinsics_report;
-    if (report && report->covariance && !dispersion.jacobian_wrt_intrinsics) return std::nullopt;
-    const bool turned = calibration.rotation_center.has_value();
-    if (turned && !(errors.is_error_source_known_or_absent(CommonErrorSource::zenith) &&
-                    dispersion.jacobian_wrt_zenith))
-      return std::nullopt;
-  }
-  const Eigen::Index offset = errors.joint_error_covariance().rows() - 2;
-  const Eigen::Vector2d focal_px = calibration.camera.focal_px();
-  return Matrix2(focal_px.asDiagonal() *
-                 errors.joint_error_covariance().block<2, 2>(offset, offset) *
-                 focal_px.asDiagonal());
-}
 
 }  // namespace vlp

@@ -39,19 +39,13 @@ inline constexpr std::array kCommonErrorSources{CommonErrorSource::lens, CommonE
 /// lamps.
 class CommonErrors {
  public:
-  /// Takes C from the adjustment. Without an adjustment, propagates the errors through the
-  /// sequential steps, with e_lens from the calibration with boards:
-  ///   e_zenith = own + jacobian_wrt_intrinsics e_lens
-  ///   e_offset = own + jacobian_wrt_intrinsics e_lens + jacobian_wrt_zenith e_zenith
-  ///              + jacobian_wrt_lamps e_lamps
-  /// jacobian_wrt_zenith is -1 if it is not reported. The lens errors count if the first applied
-  /// step reports jacobian_wrt_intrinsics, or if no step is applied. The lamp errors are the sd_m
-  /// of the survey.
+  /// Takes C from JointCovariance. The errors of the lens count alone if no step is applied. The
+  /// other lamps have the sd_m of the survey, independently. An offset whose error is unknown has
+  /// that of the zenith with the opposite sign, because it compensates it.
   ///
   /// @param lamps  the lamps of the map, in the order to which indices refer
   ///
-  /// A lamp of the adjustment or the dispersion is a lamp of the map if id and position agree, to 1
-  /// um. The errors of other lamps of a dispersion are independent of the map.
+  /// A lamp of the joint covariance is a lamp of the map if id and position agree, to 1 um.
   CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration, Correction correction);
 
   /// Returns true if the error of any calibrated quantity or lamp is known.
@@ -135,35 +129,24 @@ class CommonErrors {
   bool has_zenith_errors() const { return offset_ > intrinsics_; }
   bool has_dispersion_offset_errors() const { return num_shared_errors() > offset_; }
   /// Errors of a lamp of the map. A large map has few lamps whose errors are correlated with
-  /// others: those of an adjustment or of a dispersion have rows in the joint covariance.
+  /// others: those of JointCovariance have rows here.
   struct LampErrors {
     /// First row of the lamp, if it has rows.
     std::optional<Eigen::Index> row;
     /// Variance per axis of a lamp without rows; 0 if unknown.
-    double variance_m2 = 0;
+    double variance_m2;
+    bool is_known;
   };
   /// Derivatives of the residuals of one observation with respect to the errors.
   GainMatrix<2> compute_residual_gain(const Observations& observations, std::size_t index,
                                       const LinearizedObservation& linearized) const;
-  /// Gives rows to the lamps that are correlated with other errors, and sets the size of the joint
-  /// covariance.
-  void assign_covariance_rows_to_lamps(std::span<const Lamp> lamps, const Calibration& calibration);
+  /// Returns the row in `joint` of each row of the covariance, -1 if it is unknown. Adds the lamps.
+  std::vector<Eigen::Index> assign_covariance_rows(std::span<const Lamp> lamps,
+                                                   const JointCovariance& joint);
   /// Returns the covariance of a lamp's position, m^2; `lamp` is its index in the map.
   Eigen::Matrix3d lamp_position_covariance(std::size_t lamp) const;
   /// Returns the covariance between the positions of two lamps, m^2, by their indices in the map.
   Eigen::Matrix3d lamp_cross_covariance(std::size_t lamp, std::size_t other) const;
-  /// Sets which parts are stated, and the covariances of lens and zenith without an adjustment.
-  void set_lens_and_zenith_covariances(const Calibration& calibration);
-  /// Sets the covariances of the lamps, and all that an adjustment states.
-  void set_lamp_covariances(std::span<const Lamp> lamps,
-                            const std::optional<Adjustment>& adjustment);
-  /// Adds the effects of earlier steps to zenith and offset. @pre one of them is applied
-  void propagate_errors_to_zenith_and_offset(std::span<const Lamp> lamps,
-                                             const Calibration& calibration);
-  /// Returns the first row of a lamp of the dispersion if the map has it at the same place and
-  /// states its error.
-  std::optional<Eigen::Index> find_covariance_row_of_lamp(
-      std::span<const Lamp> lamps, const Dispersion::UncertainLamp& uncertain) const;
 
   /// Number of intrinsics, and index of the first row of the offset.
   Eigen::Index intrinsics_, offset_ = 0;
@@ -185,17 +168,5 @@ double compute_expected_chi_squared_of_common_errors(const CommonErrors::Observa
                                                      std::span<const Matrix2> residual_covariances,
                                                      const BodyFix& fix,
                                                      const BodyCovariance& common);
-
-/// Computes the covariance of the zenith's normalized point from all its sources: its captures and
-/// the lens, or the adjustment if there is one. Returns std::nullopt if a source is not reported,
-/// or if the derivative with respect to the lens is unknown.
-/// @pre there is a rotation center
-std::optional<Matrix2> compute_zenith_covariance(const Calibration& calibration);
-
-/// Computes the covariance of the dispersion's offset in px^2 from all its sources: its captures,
-/// the zenith, and the lens, which affects both. Returns std::nullopt as
-/// compute_zenith_covariance().
-/// @pre there is a dispersion
-std::optional<Matrix2> compute_dispersion_offset_covariance(const Calibration& calibration);
 
 }  // namespace vlp

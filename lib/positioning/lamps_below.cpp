@@ -34,19 +34,12 @@ LampMap turn_over(LampMap map) {
 }
 
 Calibration turn_over(Calibration calibration) {
-  if (auto& dispersion = calibration.dispersion) {
-    for (Dispersion::UncertainLamp& lamp : dispersion->uncertain_lamps) {
+  if (auto& joint = calibration.covariance) {
+    Eigen::Index row = joint->first_lamp_row();
+    for (JointCovariance::LampPosition& lamp : joint->lamps) {
       lamp.position_m = turn_over(lamp.position_m);
-      lamp.jacobian_wrt_position.rightCols<2>() *= -1;
-    }
-  }
-  if (auto& adjustment = calibration.adjustment) {
-    // The last rows of the covariance are those of the lamps.
-    Eigen::Index row = adjustment->covariance.rows() - 3 * std::ssize(adjustment->lamps);
-    for (Adjustment::AdjustedLamp& lamp : adjustment->lamps) {
-      lamp.position_m = turn_over(lamp.position_m);
-      adjustment->covariance.middleRows<2>(row + 1) *= -1;
-      adjustment->covariance.middleCols<2>(row + 1) *= -1;
+      joint->matrix.middleRows<2>(row + 1) *= -1;
+      joint->matrix.middleCols<2>(row + 1) *= -1;
       row += 3;
     }
   }

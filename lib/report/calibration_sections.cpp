@@ -79,26 +79,29 @@ std::string make_intrinsics_html_table(const IntrinsicsReport& report) {
   return make_html_table(table);
 }
 
-std::string make_rotation_html_table(const RotationCenter& center) {
+std::string make_rotation_html_table(const Calibration& calibration) {
+  const RotationCenter& center = *calibration.rotation_center;
   const Eigen::Vector3d& up = center.zenith_in_camera;
   const double tilt_rad = std::atan2(up.head<2>().norm(), up.z());
   HtmlTable table{
       "",
       {},
       {{"rotation center in the undistorted image",
-        format_pair(center.center_px, "px") + format_sds(center.covariance, 1, "px")},
+        format_pair(center.center_px, "px") +
+            format_sds(compute_rotation_center_covariance(calibration), 1, "px")},
        {"tilt of the camera", format_significant_digits(deg_from_rad(tilt_rad), 4) + " degrees"},
        {"correction", center.model == RotationModel::tilt ? "tilt" : "shift"}}};
   if (center.lever_arm_m) {
-    table.rows.push_back({"from the axis of rotation to the camera",
-                          format_pair(1e3 * *center.lever_arm_m, "mm") +
-                              format_sds(center.lever_arm_covariance, 1e3, "mm")});
+    table.rows.push_back(
+        {"from the axis of rotation to the camera",
+         format_pair(1e3 * *center.lever_arm_m, "mm") +
+             format_sds(find_parameter_covariance(calibration, kLeverArmParameter), 1e3, "mm")});
   }
   return make_html_table(table);
 }
 
-std::string make_dispersion_html_table(const Dispersion& dispersion,
-                                       const Eigen::Vector2d& focal_px) {
+std::string make_dispersion_html_table(const Calibration& calibration) {
+  const Dispersion& dispersion = *calibration.dispersion;
   const auto mm = [](double value_m) { return format_significant_digits(1e3 * value_m, 3); };
   return make_html_table(
       {"",
@@ -109,8 +112,7 @@ std::string make_dispersion_html_table(const Dispersion& dispersion,
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
         {"offset subtracted from the image",
          format_pair(dispersion.offset_px, "px") +
-             format_sds(compute_dispersion_offset_covariance_with_map_errors(dispersion, focal_px),
-                        1, "px")}}});
+             format_sds(compute_dispersion_offset_covariance(calibration), 1, "px")}}});
 }
 
 std::string make_calibration_history_html_list(const std::vector<HistoryEntry>& entries) {

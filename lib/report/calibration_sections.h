@@ -12,9 +12,8 @@ namespace vlp {
 /// Return the parts of a calibration as HTML tables.
 std::string make_camera_html_table(const Camera& camera);
 std::string make_intrinsics_html_table(const IntrinsicsReport& report);
-std::string make_rotation_html_table(const RotationCenter& center);
-std::string make_dispersion_html_table(const Dispersion& dispersion,
-                                       const Eigen::Vector2d& focal_px);
+std::string make_rotation_html_table(const Calibration& calibration);
+std::string make_dispersion_html_table(const Calibration& calibration);
 
 /// Returns the history of a calibration as HTML, one foldable entry per part: program, version and
 /// options, and a table of the inputs with their SHA-256.

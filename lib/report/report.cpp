@@ -136,11 +136,8 @@ std::string render_report_html(const Report& report) {
     camera = make_camera_html_table(calibration->camera);
     if (calibration->intrinsics_report)
       camera += make_intrinsics_html_table(*calibration->intrinsics_report);
-    if (calibration->rotation_center)
-      rotation = make_rotation_html_table(*calibration->rotation_center);
-    if (calibration->dispersion)
-      dispersion =
-          make_dispersion_html_table(*calibration->dispersion, calibration->camera.focal_px());
+    if (calibration->rotation_center) rotation = make_rotation_html_table(*calibration);
+    if (calibration->dispersion) dispersion = make_dispersion_html_table(*calibration);
   }
   const auto pictures = [&](ReportPart part) { return format_plots(report, part); };
   return make_html_page(

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <limits>
 
-#include "camera/lens_table.h"
 #include "rig/calibration_error.h"
 #include "rig/calibration_text.h"
 #include "rig/file.h"
@@ -42,97 +41,54 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 /// Largest standard deviation of a pixel, a lens parameter or a position: larger values carry
 /// no information, and products of covariances remain finite.
 constexpr double kMaxSd = 1e6;
-/// Largest derivative of a calibrated quantity by another, for the same reason.
-constexpr double kMaxDerivative = 1e12;
-/// Maximum number of lamps correlated with a dispersion, which has few captures: their joint
-/// covariance is dense.
-constexpr std::size_t kMaxUncertainLamps = 1000;
 
-/// Reads `rows` rows of `cols` numbers.
-Eigen::MatrixXd read_matrix(const YamlValue& value, std::size_t rows, std::size_t cols) {
+/// Reads the rows of the lower triangle, 1, 2, 3 ... numbers, after the rows of `known`.
+MatrixX read_covariance(const YamlValue& value, const MatrixX& known, Eigen::Index size) {
   const auto list = value.read_yaml_list();
-  if (list.size() != rows) {
-    throw value.make_yaml_error("should be " + std::to_string(rows) + " rows of " +
-                                std::to_string(cols) + " numbers");
+  if (std::ssize(list) != size - known.rows()) {
+    throw value.make_yaml_error("should be " + std::to_string(size - known.rows()) + " rows of " +
+                                std::to_string(known.rows() + 1) + ", " +
+                                std::to_string(known.rows() + 2) +
+                                " ... numbers, the lower triangle");
   }
-  Eigen::MatrixXd matrix(rows, cols);
-  for (std::size_t row = 0; row < rows; ++row) {
-    matrix.row(static_cast<Eigen::Index>(row)) = Eigen::Map<const Eigen::RowVectorXd>(
-        list[row].read_yaml_numbers(cols).data(), static_cast<Eigen::Index>(cols));
-  }
-  if (matrix.cwiseAbs().maxCoeff() > kMaxDerivative) {
-    throw value.make_yaml_error("contains a derivative beyond 1e12: is the file damaged?");
-  }
-  return matrix;
-}
-
-/// Throws InputError if a standard deviation exceeds kMaxSd.
-void check_variances(const YamlValue& value, const Eigen::MatrixXd& covariance) {
-  if (covariance.diagonal().maxCoeff() <= kMaxSd * kMaxSd) return;
-  throw value.make_yaml_error(
-      "states a standard deviation beyond 1,000,000: is it in the right unit?");
-}
-
-/// Reads the rows of the lower triangle: 1, 2, 3 ... numbers.
-Eigen::MatrixXd read_joint_covariance(const YamlValue& value, std::size_t size) {
-  const auto list = value.read_yaml_list();
-  if (list.size() != size) {
-    throw value.make_yaml_error("should be " + std::to_string(size) +
-                                " rows of 1, 2, 3 ... numbers, the lower triangle");
-  }
+  // All numbers are read first, so that the matrix is not larger than the file.
+  std::vector<std::vector<double>> rows;
+  for (const YamlValue& item : list)
+    rows.push_back(
+        item.read_yaml_numbers(static_cast<std::size_t>(known.rows()) + rows.size() + 1));
   Eigen::MatrixXd matrix(size, size);
-  for (std::size_t row = 0; row < size; ++row) {
-    const auto numbers = list[row].read_yaml_numbers(row + 1);
-    for (std::size_t col = 0; col <= row; ++col) {
-      const auto i = static_cast<Eigen::Index>(row), j = static_cast<Eigen::Index>(col);
-      matrix(i, j) = matrix(j, i) = numbers[col];
-    }
+  matrix.topLeftCorner(known.rows(), known.rows()) = known;
+  for (Eigen::Index row = known.rows(); row < size; ++row) {
+    const auto index = static_cast<std::size_t>(row - known.rows());
+    matrix.row(row).head(row + 1) =
+        Eigen::Map<const Eigen::RowVectorXd>(rows[index].data(), row + 1);
+    matrix.col(row).head(row) = matrix.row(row).head(row).transpose();
     // Checks each correlation: an invalid covariance usually has a mistake in one number.
-    for (std::size_t col = 0; col <= row; ++col) {
-      const auto i = static_cast<Eigen::Index>(row), j = static_cast<Eigen::Index>(col);
+    for (Eigen::Index col = 0; col <= row; ++col) {
       constexpr double rounding = 1e-9;
-      if (matrix(i, i) < 0 ||
-          matrix(i, j) * matrix(i, j) > matrix(i, i) * matrix(j, j) * (1 + rounding)) {
-        throw list[row].make_yaml_error("is not a covariance's: no correlation is beyond 1");
+      if (matrix(row, row) < 0 || matrix(row, col) * matrix(row, col) >
+                                      matrix(row, row) * matrix(col, col) * (1 + rounding)) {
+        // [FILE-5] `is not a covariance`
+        throw list[index].make_yaml_error("is not a covariance's: no correlation is beyond 1");
       }
     }
   }
-  check_variances(value, matrix);
+  if (size > 0 && matrix.diagonal().maxCoeff() > kMaxSd * kMaxSd) {
+    throw value.make_yaml_error(
+        "states a standard deviation beyond 1,000,000: is it in the right unit?");
+  }
   return matrix;
 }
 
-Matrix2 read_covariance(const YamlValue& value) {
-  const auto rows = value.read_yaml_list();
-  if (rows.size() != 2) throw value.make_yaml_error("should be two rows of two numbers");
-  Matrix2 covariance;
-  for (int row = 0; row < 2; ++row) {
-    covariance.row(row) =
-        Eigen::RowVector2d(rows[static_cast<std::size_t>(row)].read_yaml_numbers(2).data());
+/// Throws InputError if a part has a covariance beside joint_covariance.
+void check_no_covariance(const YamlMap& map, const std::string& program) {
+  if (map.has_yaml_key("covariance")) {
+    throw map.make_yaml_error("key 'covariance' is now in joint_covariance: run " + program +
+                              " again on the calibration from before it");
   }
-  const double product = covariance(0, 0) * covariance(1, 1);
-  constexpr double rounding = 1e-12;  // of a full correlation
-  if (covariance(0, 1) != covariance(1, 0) || covariance(0, 0) < 0 || covariance(1, 1) < 0 ||
-      covariance(0, 1) * covariance(0, 1) > product * (1 + rounding)) {
-    // [FILE-5] `is not a covariance`
-    throw value.make_yaml_error("is not a covariance: it should be symmetric and not negative");
-  }
-  check_variances(value, covariance);
-  return covariance;
 }
 
-template <typename Matrix>
-std::optional<Matrix> read_optional_matrix(YamlMap& map, const std::string& key, std::size_t rows,
-                                           std::size_t cols) {
-  const auto value = map.get_optional_yaml_value(key);
-  return value ? std::optional<Matrix>(read_matrix(*value, rows, cols)) : std::nullopt;
-}
-
-std::optional<Matrix2> read_optional_covariance(YamlMap& map, const std::string& key) {
-  const auto value = map.get_optional_yaml_value(key);
-  return value ? std::optional(read_covariance(*value)) : std::nullopt;
-}
-
-IntrinsicsReport read_intrinsics_report(YamlMap& map, std::size_t intrinsics) {
+IntrinsicsReport read_intrinsics_report(YamlMap& map, Eigen::Index intrinsics) {
   IntrinsicsReport report;
   report.views = map.get_required_yaml_value("views").read_yaml_integer_within(0, kLarge);
   report.corners = map.get_required_yaml_value("corners").read_yaml_integer_within(0, kLarge);
@@ -145,7 +101,7 @@ IntrinsicsReport read_intrinsics_report(YamlMap& map, std::size_t intrinsics) {
   report.expected_max_error_px =
       map.get_optional_yaml_number("expected_max_error_px", 0, kInfinity, "px");
   if (const auto value = map.get_optional_yaml_value("covariance")) {
-    report.covariance = read_joint_covariance(*value, intrinsics);
+    report.covariance = read_covariance(*value, MatrixX(0, 0), intrinsics);
   }
   if (const auto value = map.get_optional_yaml_value("valid_region_px")) {
     for (const YamlValue& corner : value->read_yaml_list()) {
@@ -157,7 +113,8 @@ IntrinsicsReport read_intrinsics_report(YamlMap& map, std::size_t intrinsics) {
   return report;
 }
 
-RotationCenter read_rotation_center(YamlMap& map, std::size_t intrinsics) {
+RotationCenter read_rotation_center(YamlMap& map) {
+  check_no_covariance(map, "vlp-rotation");
   RotationCenter center;
   const YamlValue model = map.get_required_yaml_value("model");
   if (model.read_yaml_string() != "shift" && model.read_yaml_string() != "tilt") {
@@ -172,36 +129,13 @@ RotationCenter read_rotation_center(YamlMap& map, std::size_t intrinsics) {
   if (std::abs(center.zenith_in_camera.norm() - 1) > 1e-5 || center.zenith_in_camera.z() <= 0) {
     throw zenith.make_yaml_error("should be a unit vector with z > 0");
   }
-  center.covariance = read_optional_covariance(map, "covariance");
-  const auto lever_arm = map.get_optional_yaml_value("lever_arm_m");
-  if (lever_arm) center.lever_arm_m = Eigen::Vector2d(lever_arm->read_yaml_numbers(2).data());
-  const auto check_lever_arm = [&](const std::string& key) {
-    const auto value = map.get_optional_yaml_value(key);
-    if (value && !lever_arm) throw value->make_yaml_error("is of no lever_arm_m");
-    return key;
-  };
-  center.lever_arm_covariance =
-      read_optional_covariance(map, check_lever_arm("lever_arm_covariance"));
-  center.jacobian_wrt_intrinsics =
-      read_optional_matrix<MatrixX>(map, "jacobian_intrinsics", 2, intrinsics);
-  center.lever_arm_jacobian_wrt_zenith =
-      read_optional_matrix<Matrix2>(map, check_lever_arm("lever_arm_jacobian_zenith"), 2, 2);
-  center.lever_arm_jacobian_wrt_intrinsics = read_optional_matrix<MatrixX>(
-      map, check_lever_arm("lever_arm_jacobian_intrinsics"), 2, intrinsics);
+  if (const auto lever_arm = map.get_optional_yaml_value("lever_arm_m"))
+    center.lever_arm_m = Eigen::Vector2d(lever_arm->read_yaml_numbers(2).data());
   return center;
 }
 
-Dispersion::UncertainLamp read_uncertain_lamp(YamlMap& map) {
-  Dispersion::UncertainLamp lamp;
-  lamp.id = map.get_required_yaml_value("id").read_yaml_integer_within(0, kLarge);
-  lamp.position_m =
-      Eigen::Vector3d(map.get_required_yaml_value("position_m").read_yaml_numbers(3).data());
-  lamp.sd_m = map.get_required_yaml_value("sd_m").read_yaml_number_within(0, kMaxSd, "m");
-  lamp.jacobian_wrt_position = read_matrix(map.get_required_yaml_value("by_position"), 2, 3);
-  return lamp;
-}
-
-Dispersion read_dispersion(YamlMap& map, std::size_t intrinsics) {
+Dispersion read_dispersion(YamlMap& map) {
+  check_no_covariance(map, "vlp-dispersion");
   Dispersion dispersion;
   dispersion.offset_px =
       Eigen::Vector2d(map.get_required_yaml_value("offset_px").read_yaml_numbers(2).data());
@@ -210,31 +144,11 @@ Dispersion read_dispersion(YamlMap& map, std::size_t intrinsics) {
   dispersion.center_m =
       Eigen::Vector2d(map.get_required_yaml_value("center_m").read_yaml_numbers(2).data());
   dispersion.captures = map.get_required_yaml_value("captures").read_yaml_integer_within(1, kLarge);
-  dispersion.covariance = read_optional_covariance(map, "covariance");
-  dispersion.jacobian_wrt_intrinsics =
-      read_optional_matrix<MatrixX>(map, "jacobian_intrinsics", 2, intrinsics);
-  dispersion.jacobian_wrt_zenith = read_optional_matrix<Matrix2>(map, "jacobian_zenith", 2, 2);
-  if (const auto value = map.get_optional_yaml_value("by_lamps")) {
-    const auto items = value->read_yaml_list();
-    if (items.size() > kMaxUncertainLamps)
-      throw value->make_yaml_error("contains more than 1,000 lamps");
-    for (const YamlValue& item : items) {
-      const Dispersion::UncertainLamp lamp = item.convert_yaml_mapping(read_uncertain_lamp);
-      const auto has_same_id = [&](const auto& earlier) { return earlier.id == lamp.id; };
-      if (std::ranges::any_of(dispersion.uncertain_lamps, has_same_id))
-        throw item.make_yaml_error("occurs twice");
-      dispersion.uncertain_lamps.push_back(lamp);
-    }
-  }
   return dispersion;
 }
 
-Adjustment::AdjustedLamp read_adjusted_lamp_position(YamlMap& map) {
-  return {map.get_required_yaml_value("id").read_yaml_integer_within(0, kLarge),
-          Eigen::Vector3d(map.get_required_yaml_value("position_m").read_yaml_numbers(3).data())};
-}
-
-Adjustment read_adjustment(YamlMap& map, const Camera& camera) {
+Adjustment read_adjustment(YamlMap& map) {
+  check_no_covariance(map, "vlp-adjust");
   Adjustment adjustment;
   for (const YamlValue& item : map.get_required_yaml_value("sets").read_yaml_list())
     adjustment.sets.push_back(item.read_yaml_string());
@@ -243,22 +157,55 @@ Adjustment read_adjustment(YamlMap& map, const Camera& camera) {
       map.get_required_yaml_value("detections").read_yaml_integer_within(1, kLarge);
   adjustment.residual_px =
       map.get_required_yaml_value("residual_px").read_yaml_number_within(0, kInfinity, "px");
-  adjustment.lamps =
-      map.get_required_yaml_value("lamps").convert_yaml_mapping_list(read_adjusted_lamp_position);
-  const YamlValue parameters = map.get_required_yaml_value("parameters");
-  const auto found = parameters.read_yaml_list();
-  const auto names = list_adjustment_parameter_names(camera, adjustment);
-  for (std::size_t i = 0; i < std::max(found.size(), names.size()); ++i) {
-    if (i >= found.size() || i >= names.size() || found[i].read_yaml_string() != names[i]) {
-      // [FILE-4] `is missing in its place`, `there are more than these`
-      throw parameters.make_yaml_error(
-          "should be the lens model's, the zenith, the lever arm, the lamps: " +
-          (i < names.size() ? names[i] + " is missing in its place" : "there are more than these"));
-    }
-  }
-  adjustment.covariance =
-      read_joint_covariance(map.get_required_yaml_value("covariance"), names.size());
   return adjustment;
+}
+
+JointCovariance::LampPosition read_lamp_position(YamlMap& map) {
+  return {map.get_required_yaml_value("id").read_yaml_integer_within(0, kLarge),
+          Eigen::Vector3d(map.get_required_yaml_value("position_m").read_yaml_numbers(3).data())};
+}
+
+JointCovariance read_joint_covariance(YamlMap& map, const Calibration& calibration) {
+  JointCovariance joint;
+  joint.lamps = map.get_required_yaml_value("lamps").convert_yaml_mapping_list(read_lamp_position);
+  std::vector<std::string> lamp_names;
+  for (const auto& lamp : joint.lamps)
+    std::ranges::move(list_lamp_parameter_names(lamp.id), std::back_inserter(lamp_names));
+  const YamlValue parameters = map.get_required_yaml_value("parameters");
+  const auto items = parameters.read_yaml_list();
+  const auto& report = calibration.intrinsics_report;
+  MatrixX lens(0, 0);
+  const auto read_names_if_next = [&](std::span<const std::string> names, bool is_required) {
+    const std::size_t first = joint.parameters.size();
+    if (names.empty() || (!is_required && (first >= items.size() ||
+                                           items[first].read_yaml_string() != names.front())))
+      return false;
+    for (const std::string& name : names) {
+      const std::size_t at = joint.parameters.size();
+      if (at >= items.size() || items[at].read_yaml_string() != name) {
+        // [FILE-4] `is missing in its place`
+        throw parameters.make_yaml_error(name + " is missing in its place");
+      }
+      joint.parameters.push_back(name);
+    }
+    return true;
+  };
+  if (read_names_if_next(list_intrinsics_names(calibration.camera), false)) {
+    if (!report || !report->covariance)
+      throw parameters.make_yaml_error("has the lens, and intrinsics_report has no covariance");
+    lens = *report->covariance;
+  }
+  read_names_if_next(list_pair_names(kZenithParameter), false);
+  read_names_if_next(list_pair_names(kLeverArmParameter), false);
+  read_names_if_next(lamp_names, true);
+  read_names_if_next(list_pair_names(kOffsetParameter), false);
+  if (joint.parameters.size() < items.size()) {
+    // [FILE-4] `is not in its place`
+    throw items[joint.parameters.size()].make_yaml_error(
+        "is not in its place: the order is lens, zenith, lever arm, lamps, offset");
+  }
+  joint.matrix = read_covariance(map.get_required_yaml_value("rows"), lens, std::ssize(items));
+  return joint;
 }
 
 HistoryEntry::Input read_history_input(YamlMap& map) {
@@ -293,19 +240,11 @@ void emit_camera(YAML::Emitter& out, const Camera& camera) {
   out << YAML::EndMap;
 }
 
-void emit_matrix(YAML::Emitter& out, const char* key, const Eigen::MatrixXd& matrix) {
-  out << YAML::Key << key << YAML::Value << YAML::Flow << YAML::BeginSeq;
-  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
-    const Eigen::VectorXd numbers = matrix.row(row);
-    emit_yaml_inline_list(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
-  }
-  out << YAML::EndSeq;
-}
-
-/// Writes the rows of the lower triangle.
-void emit_joint_covariance(YAML::Emitter& out, const Eigen::MatrixXd& covariance) {
-  out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
-  for (Eigen::Index row = 0; row < covariance.rows(); ++row) {
+/// Writes the rows of the lower triangle from the first one on.
+void emit_covariance(YAML::Emitter& out, const char* key, const MatrixX& covariance,
+                     Eigen::Index first) {
+  out << YAML::Key << key << YAML::Value << YAML::BeginSeq;
+  for (Eigen::Index row = first; row < covariance.rows(); ++row) {
     const Eigen::VectorXd numbers = covariance.row(row).head(row + 1);
     emit_yaml_inline_list(out, {numbers.data(), static_cast<std::size_t>(numbers.size())});
   }
@@ -323,7 +262,7 @@ void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) 
   if (report.expected_max_error_px && std::isfinite(*report.expected_max_error_px)) {
     emit_yaml_number(out, "expected_max_error_px", *report.expected_max_error_px);
   }
-  if (report.covariance) emit_joint_covariance(out, *report.covariance);
+  if (report.covariance) emit_covariance(out, "covariance", *report.covariance, 0);
   if (!report.region_px.empty()) {
     out << YAML::Key << "valid_region_px" << YAML::Value << YAML::Flow << YAML::BeginSeq;
     for (const Eigen::Vector2d& corner : report.region_px) {
@@ -334,36 +273,13 @@ void emit_intrinsics_report(YAML::Emitter& out, const IntrinsicsReport& report) 
   out << YAML::EndMap;
 }
 
-void emit_optional_matrix(YAML::Emitter& out, const char* key, const auto& matrix) {
-  if (matrix) emit_matrix(out, key, *matrix);
-}
-
 void emit_rotation_center(YAML::Emitter& out, const RotationCenter& center) {
   begin_yaml_section(out, "rotation_center");
   emit_yaml_plain_word(out, "model", center.model == RotationModel::tilt ? "tilt" : "shift");
   emit_yaml_numbers(out, "center_px", center.center_px);
   emit_yaml_numbers(out, "zenith_in_camera", center.zenith_in_camera);
-  emit_optional_matrix(out, "covariance", center.covariance);
   if (center.lever_arm_m) emit_yaml_numbers(out, "lever_arm_m", *center.lever_arm_m);
-  emit_optional_matrix(out, "lever_arm_covariance", center.lever_arm_covariance);
-  emit_optional_matrix(out, "jacobian_intrinsics", center.jacobian_wrt_intrinsics);
-  emit_optional_matrix(out, "lever_arm_jacobian_zenith", center.lever_arm_jacobian_wrt_zenith);
-  emit_optional_matrix(out, "lever_arm_jacobian_intrinsics",
-                       center.lever_arm_jacobian_wrt_intrinsics);
   out << YAML::EndMap;
-}
-
-void emit_uncertain_lamps(YAML::Emitter& out, const std::vector<Dispersion::UncertainLamp>& lamps) {
-  out << YAML::Key << "by_lamps" << YAML::Value << YAML::BeginSeq;
-  for (const auto& [id, position_m, sd_m, by_position] : lamps) {
-    out << YAML::Flow << YAML::BeginMap;
-    emit_yaml_integer(out, "id", id);
-    emit_yaml_numbers(out, "position_m", position_m);
-    emit_yaml_number(out, "sd_m", sd_m);
-    emit_matrix(out, "by_position", by_position);
-    out << YAML::EndMap;
-  }
-  out << YAML::EndSeq;
 }
 
 void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
@@ -372,14 +288,10 @@ void emit_dispersion(YAML::Emitter& out, const Dispersion& dispersion) {
   emit_yaml_number(out, "radius_m", dispersion.radius_m);
   emit_yaml_numbers(out, "center_m", dispersion.center_m);
   emit_yaml_integer(out, "captures", dispersion.captures);
-  emit_optional_matrix(out, "covariance", dispersion.covariance);
-  emit_optional_matrix(out, "jacobian_intrinsics", dispersion.jacobian_wrt_intrinsics);
-  emit_optional_matrix(out, "jacobian_zenith", dispersion.jacobian_wrt_zenith);
-  if (!dispersion.uncertain_lamps.empty()) emit_uncertain_lamps(out, dispersion.uncertain_lamps);
   out << YAML::EndMap;
 }
 
-void emit_adjustment(YAML::Emitter& out, const Camera& camera, const Adjustment& adjustment) {
+void emit_adjustment(YAML::Emitter& out, const Adjustment& adjustment) {
   begin_yaml_section(out, "adjustment");
   out << YAML::Key << "sets" << YAML::Value << YAML::Flow << YAML::BeginSeq;
   for (const std::string& set : adjustment.sets) out << YAML::DoubleQuoted << set;
@@ -387,17 +299,22 @@ void emit_adjustment(YAML::Emitter& out, const Camera& camera, const Adjustment&
   emit_yaml_integer(out, "captures", adjustment.captures);
   emit_yaml_integer(out, "detections", adjustment.detections);
   emit_yaml_number(out, "residual_px", adjustment.residual_px);
+  out << YAML::EndMap;
+}
+
+void emit_joint_covariance(YAML::Emitter& out, const JointCovariance& joint, Eigen::Index lens) {
+  begin_yaml_section(out, "joint_covariance");
   out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
-  for (const auto& [id, position_m] : adjustment.lamps) {
+  for (const auto& [id, position_m] : joint.lamps) {
     out << YAML::Flow << YAML::BeginMap;
     emit_yaml_integer(out, "id", id);
     emit_yaml_numbers(out, "position_m", position_m);
     out << YAML::EndMap;
   }
   out << YAML::EndSeq << YAML::Key << "parameters" << YAML::Value << YAML::Flow << YAML::BeginSeq;
-  for (const std::string& name : list_adjustment_parameter_names(camera, adjustment)) out << name;
+  for (const std::string& name : joint.parameters) out << name;
   out << YAML::EndSeq;
-  emit_joint_covariance(out, adjustment.covariance);
+  emit_covariance(out, "rows", joint.matrix, joint.find_row("fx") ? lens : 0);
   out << YAML::EndMap;
 }
 
@@ -440,20 +357,6 @@ Camera read_camera_from_yaml(YamlMap& map) {
   return camera;
 }
 
-std::vector<std::string> list_adjustment_parameter_names(const Camera& camera,
-                                                         const Adjustment& adjustment) {
-  std::vector<std::string> names{"fx", "fy", "cx", "cy"};
-  for (const auto& distortion : list_distortion_names_and_initial_values(camera.lens_model)) {
-    names.emplace_back(distortion.name);
-  }
-  names.insert(names.end(), {"zenith_x", "zenith_y", "lever_arm_x_m", "lever_arm_y_m"});
-  for (const Adjustment::AdjustedLamp& lamp : adjustment.lamps) {
-    const std::string prefix = "lamp_" + std::to_string(lamp.id);
-    for (const char* axis : {"_x_m", "_y_m", "_z_m"}) names.push_back(prefix + axis);
-  }
-  return names;
-}
-
 Calibration read_calibration(const std::filesystem::path& file) {
   YamlMap document = read_yaml_file(file, "vlp-calibration/1");
   Calibration calibration;
@@ -462,19 +365,20 @@ Calibration read_calibration(const std::filesystem::path& file) {
   const auto rotation_center = document.get_optional_yaml_value("rotation_center");
   const auto dispersion = document.get_optional_yaml_value("dispersion");
   const auto adjustment = document.get_optional_yaml_value("adjustment");
+  const auto covariance = document.get_optional_yaml_value("joint_covariance");
   const auto history = document.get_optional_yaml_value("history");
   document.check_all_yaml_keys_read();
   calibration.camera = camera.convert_yaml_mapping(read_camera_from_yaml);
-  const auto read_if = [](const auto& value, const auto& read, const auto& argument) {
-    const auto read_part = [&](YamlMap& map) { return read(map, argument); };
+  const auto read_if = [](const auto& value, const auto& read, const auto&... arguments) {
+    const auto read_part = [&](YamlMap& map) { return read(map, arguments...); };
     return value ? std::optional(value->convert_yaml_mapping(read_part)) : std::nullopt;
   };
-  const auto intrinsics =
-      static_cast<std::size_t>(count_intrinsics_with_covariance(calibration.camera));
+  const Eigen::Index intrinsics = count_intrinsics_with_covariance(calibration.camera);
   calibration.intrinsics_report = read_if(report, read_intrinsics_report, intrinsics);
-  calibration.rotation_center = read_if(rotation_center, read_rotation_center, intrinsics);
-  calibration.dispersion = read_if(dispersion, read_dispersion, intrinsics);
-  calibration.adjustment = read_if(adjustment, read_adjustment, calibration.camera);
+  calibration.adjustment = read_if(adjustment, read_adjustment);
+  calibration.rotation_center = read_if(rotation_center, read_rotation_center);
+  calibration.dispersion = read_if(dispersion, read_dispersion);
+  calibration.covariance = read_if(covariance, read_joint_covariance, calibration);
   if (!history) return calibration;
   for (const YamlValue& item : history->read_yaml_list()) {
     calibration.history.push_back(item.convert_yaml_mapping(read_history_entry));
@@ -495,8 +399,10 @@ std::string format_calibration_yaml(const Calibration& calibration) {
   if (calibration.intrinsics_report) emit_intrinsics_report(out, *calibration.intrinsics_report);
   if (calibration.rotation_center) emit_rotation_center(out, *calibration.rotation_center);
   if (calibration.dispersion) emit_dispersion(out, *calibration.dispersion);
-  if (calibration.adjustment) {
-    emit_adjustment(out, calibration.camera, *calibration.adjustment);
+  if (calibration.adjustment) emit_adjustment(out, *calibration.adjustment);
+  if (calibration.covariance) {
+    emit_joint_covariance(out, *calibration.covariance,
+                          count_intrinsics_with_covariance(calibration.camera));
   }
   emit_camera(out, calibration.camera);
   out << YAML::EndMap << YAML::Newline;

@@ -3,10 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "../camera/lens_model.h"
@@ -57,7 +60,6 @@ struct IntrinsicsReport {
   /// lens has no ray there; infinity is not written to files.
   std::optional<double> expected_max_error_px;
   /// Covariance of the intrinsics, in their order. Splined lenses: none, or only fx, fy, cx, cy.
-  /// The same applies to all derivatives with respect to the intrinsics below.
   std::optional<MatrixX> covariance = {};
   /// Polygon of the calibrated region, as its consecutive corners; empty: the entire image.
   std::vector<Eigen::Vector2d> region_px = {};
@@ -77,22 +79,10 @@ struct RotationCenter {
   Eigen::Vector2d center_px;
   /// Up direction in the camera frame, unit length.
   Eigen::Vector3d zenith_in_camera;
-  /// Covariance of center_px in px^2, from the captures alone; std::nullopt if unknown.
-  std::optional<Matrix2> covariance = {};
-  /// Vector from the axis of rotation to the camera, x and y in the level frame, and its covariance
-  /// in m^2. Fixes are of the camera with or without it. If the robot's center is on the axis and
-  /// the camera's yaw on the robot is zero, it equals x and y of CameraMount::position_in_robot_m.
+  /// Vector from the axis of rotation to the camera, x and y in the level frame. Fixes are of the
+  /// camera with or without it. If the robot's center is on the axis and the camera's yaw on the
+  /// robot is zero, it equals x and y of CameraMount::position_in_robot_m.
   std::optional<Eigen::Vector2d> lever_arm_m = {};
-  std::optional<Matrix2> lever_arm_covariance = {};
-  /// Derivative of the zenith's normalized point (x/z, y/z) with respect to the intrinsics, one
-  /// column each. `covariance` is from the captures alone, with the lens taken as exact.
-  std::optional<MatrixX> jacobian_wrt_intrinsics = {};
-  /// Regression of the lever arm, in m, on the error of the zenith's normalized point, if the same
-  /// captures determine both. lever_arm_jacobian_wrt_intrinsics: derivative of the lever arm, m,
-  /// with respect to the intrinsics, one column each. The remainder of lever_arm_covariance is
-  /// independent of both.
-  std::optional<Matrix2> lever_arm_jacobian_wrt_zenith = {};
-  std::optional<MatrixX> lever_arm_jacobian_wrt_intrinsics = {};
 };
 
 /// Result of the dispersion calibration (Chen and Guan, section 3.2): remaining error of fixes that
@@ -106,37 +96,10 @@ struct Dispersion {
   double radius_m;
   Eigen::Vector2d center_m;
   int captures;
-  /// Covariance of offset_px in px^2 from captures and lever arm, with lens, zenith and lamp map
-  /// taken as exact. The contribution of the lever arm may depend on the lamp map.
-  std::optional<Matrix2> covariance = {};
-  /// Derivatives of offset_px / f with respect to the intrinsics and to the zenith's normalized
-  /// point.
-  std::optional<MatrixX> jacobian_wrt_intrinsics = {};
-  std::optional<Matrix2> jacobian_wrt_zenith = {};
-  /// Lamp whose surveyed position affects the offset, with the derivative.
-  struct UncertainLamp {
-    int id;
-    /// Position and standard deviation per axis in the map of the calibration.
-    Eigen::Vector3d position_m;
-    double sd_m;
-    /// Derivative of offset_px / f with respect to the position, per meter.
-    Eigen::Matrix<double, 2, 3, Eigen::DontAlign> jacobian_wrt_position;
-  };
-  /// Lamps of the map with a positive sd_m that appear in the captures.
-  std::vector<UncertainLamp> uncertain_lamps = {};
 };
 
-/// Result of one joint adjustment of many captures (vlp-adjust).
+/// Origin of the results of one joint adjustment of many captures (vlp-adjust).
 struct Adjustment {
-  /// Position of a lamp in the map that belongs to the covariance.
-  struct AdjustedLamp {
-    int id;
-    Eigen::Vector3d position_m;
-  };
-  std::vector<AdjustedLamp> lamps;
-  /// Joint covariance of: intrinsics; the zenith's normalized point (x/z, y/z); the lever arm, x
-  /// and y in meters; x, y and z of each lamp. Zero for quantities taken as exact.
-  MatrixX covariance;
   /// Names of the folders or tables of the input data, without the path.
   std::vector<std::string> sets;
   int captures;
@@ -145,10 +108,50 @@ struct Adjustment {
   double residual_px;
 };
 
-/// Returns a name for each row of Adjustment::covariance: fx, fy, cx, cy, k1 ..., zenith_x,
-/// zenith_y, lever_arm_x_m, lever_arm_y_m, lamp_ID_x_m ...
-std::vector<std::string> list_adjustment_parameter_names(const Camera& camera,
-                                                         const Adjustment& adjustment);
+/// Names of the first of two parameters of JointCovariance: the zenith's normalized point (x/z,
+/// y/z); the lever arm, m; Dispersion::offset_px divided by the focal lengths. The second name has
+/// y in place of x.
+inline constexpr std::string_view kZenithParameter = "zenith_x",
+                                  kLeverArmParameter = "lever_arm_x_m",
+                                  kOffsetParameter = "offset_x";
+
+/// Joint covariance of the results of all calibration steps.
+struct JointCovariance {
+  /// Position of a lamp in the map that belongs to the covariance.
+  struct LampPosition {
+    int id;
+    Eigen::Vector3d position_m;
+  };
+  /// Lamps whose positions are among the parameters, in their order.
+  std::vector<LampPosition> lamps;
+  /// Name of each row: fx, fy, cx, cy, k1 ... if the errors of the lens are known, then as far as
+  /// they are known zenith_x, zenith_y, lever_arm_x_m, lever_arm_y_m, lamp_ID_x_m ..., offset_x,
+  /// offset_y.
+  std::vector<std::string> parameters;
+  /// Covariance of the parameters in their order. That of the lens equals
+  /// IntrinsicsReport::covariance. It is zero for quantities taken as exact.
+  MatrixX matrix;
+
+  /// Returns the row of a parameter; std::nullopt if its error is unknown.
+  std::optional<Eigen::Index> find_row(std::string_view parameter) const {
+    const auto found = std::find(parameters.begin(), parameters.end(), parameter);
+    return found == parameters.end() ? std::nullopt : std::optional(found - parameters.begin());
+  }
+  /// Returns the row of the x of a lamp, by its id and its position to 1 um; std::nullopt if it is
+  /// not among the parameters.
+  std::optional<Eigen::Index> find_lamp_row(int id, const Eigen::Vector3d& position_m) const {
+    constexpr double tolerance_m = 1e-6;
+    const auto lamp = std::find_if(lamps.begin(), lamps.end(), [&](const LampPosition& one) {
+      return one.id == id && (one.position_m - position_m).norm() < tolerance_m;
+    });
+    if (lamp == lamps.end()) return std::nullopt;
+    return first_lamp_row() + 3 * (lamp - lamps.begin());
+  }
+  /// Returns the row of the first lamp's x; those of the other lamps follow.
+  Eigen::Index first_lamp_row() const {
+    return std::ssize(parameters) - 3 * std::ssize(lamps) - (find_row(kOffsetParameter) ? 2 : 0);
+  }
+};
 
 /// Provenance of a part of a calibration: program, options and digests of the input files.
 struct HistoryEntry {
@@ -173,6 +176,8 @@ struct Calibration {
   std::optional<Dispersion> dispersion;
   std::vector<HistoryEntry> history;
   std::optional<Adjustment> adjustment = {};
+  /// std::nullopt if no step states the errors of its results.
+  std::optional<JointCovariance> covariance = {};
 };
 
 /// Reads `vlp-calibration/1`; keys are the names of the fields above.

@@ -30,31 +30,49 @@ Calibration make_camera_only_calibration(Camera camera, std::optional<Intrinsics
 
 Calibration add_rotation_center_to_calibration(Calibration calibration,
                                                const RotationCenter& rotation_center,
+                                               std::optional<JointCovariance> covariance,
                                                HistoryEntry entry) {
-  calibration.dispersion.reset();
-  remove_history(calibration, "dispersion");
+  calibration = remove_dispersion_from_calibration(std::move(calibration));
   calibration.adjustment.reset();
   remove_history(calibration, "adjustment");
   calibration.rotation_center = rotation_center;
+  calibration.covariance = std::move(covariance);
   add_history(calibration, "rotation_center", std::move(entry));
   return calibration;
 }
 
 Calibration add_adjustment_to_calibration(Calibration calibration,
                                           const RotationCenter& rotation_center,
-                                          Adjustment adjustment, HistoryEntry entry) {
-  calibration.dispersion.reset();
-  remove_history(calibration, "dispersion");
+                                          Adjustment adjustment, JointCovariance covariance,
+                                          HistoryEntry entry) {
+  calibration = remove_dispersion_from_calibration(std::move(calibration));
   remove_history(calibration, "rotation_center");
   calibration.rotation_center = rotation_center;
   calibration.adjustment = std::move(adjustment);
+  calibration.covariance = std::move(covariance);
   add_history(calibration, "adjustment", std::move(entry));
   return calibration;
 }
 
+Calibration remove_dispersion_from_calibration(Calibration calibration) {
+  calibration.dispersion.reset();
+  remove_history(calibration, "dispersion");
+  if (auto& joint = calibration.covariance; joint && joint->find_row(kOffsetParameter)) {
+    const bool keeps_lamps = calibration.adjustment.has_value();
+    const Eigen::Index rows =
+        keeps_lamps ? std::ssize(joint->parameters) - 2 : joint->first_lamp_row();
+    if (!keeps_lamps) joint->lamps.clear();
+    joint->parameters.resize(static_cast<std::size_t>(rows));
+    joint->matrix.conservativeResize(rows, rows);
+  }
+  return calibration;
+}
+
 Calibration add_dispersion_to_calibration(Calibration calibration, const Dispersion& dispersion,
+                                          std::optional<JointCovariance> covariance,
                                           HistoryEntry entry) {
   calibration.dispersion = dispersion;
+  calibration.covariance = std::move(covariance);
   add_history(calibration, "dispersion", std::move(entry));
   return calibration;
 }

@@ -44,10 +44,6 @@ constexpr std::array kRenamings{
     // calibration.yaml
     Renaming{NameKind::key, "uncertainty_px", "expected_max_error_px"},
     Renaming{NameKind::key, "region_px", "valid_region_px"},
-    Renaming{NameKind::key, "by_intrinsics", "jacobian_intrinsics"},
-    Renaming{NameKind::key, "by_zenith", "jacobian_zenith"},
-    Renaming{NameKind::key, "lever_arm_by_intrinsics", "lever_arm_jacobian_intrinsics"},
-    Renaming{NameKind::key, "lever_arm_by_zenith", "lever_arm_jacobian_zenith"},
     // captures.csv
     Renaming{NameKind::column, "spot", "pivot"},
     Renaming{NameKind::column, "place", "reference_point"},

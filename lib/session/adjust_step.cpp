@@ -193,25 +193,25 @@ AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, History
   if (const auto& arm_m = found.center.lever_arm_m) {
     result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});
   }
-  Adjustment adjustment{{},
-                        input.refine_map ? found.refined_covariance : found.surveyed_covariance,
-                        {},
-                        found.captures,
-                        found.detections,
-                        found.residual_px};
+  Adjustment adjustment{{}, found.captures, found.detections, found.residual_px};
   for (const AdjustSet& set : input.sets) adjustment.sets.push_back(set.name);
   const LampMap& map = input.refine_map ? found.refined_map : input.lamps;
-  for (const int id : found.covariance_lamp_ids) {
-    adjustment.lamps.push_back({id, find_lamp_by_id(map.lamps, id)->position_m});
-  }
+  std::vector<JointCovariance::LampPosition> lamps;
+  for (const int id : found.covariance_lamp_ids)
+    lamps.push_back({id, find_lamp_by_id(map.lamps, id)->position_m});
   Calibration calibration = input.calibration;
   calibration.camera = found.camera;
-  if (calibration.intrinsics_report && calibration.intrinsics_report->covariance) {
-    const Eigen::Index n = count_intrinsics_with_covariance(found.camera);
-    calibration.intrinsics_report->covariance = adjustment.covariance.topLeftCorner(n, n);
-  }
-  result.calibration = add_adjustment_to_calibration(std::move(calibration), found.center,
-                                                     std::move(adjustment), std::move(entry));
+  auto& report = calibration.intrinsics_report;
+  const Eigen::MatrixXd& covariance =
+      input.refine_map ? found.refined_covariance : found.surveyed_covariance;
+  const Eigen::Index n = count_intrinsics_with_covariance(found.camera),
+                     rows = covariance.rows() - (report && report->covariance ? 0 : n);
+  if (report && report->covariance) report->covariance = covariance.topLeftCorner(n, n);
+  JointCovariance joint = make_adjusted_covariance(found.camera, std::move(lamps),
+                                                   covariance.bottomRightCorner(rows, rows));
+  result.calibration =
+      add_adjustment_to_calibration(std::move(calibration), found.center, std::move(adjustment),
+                                    std::move(joint), std::move(entry));
   return result;
 }
 

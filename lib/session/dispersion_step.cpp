@@ -108,62 +108,60 @@ void warn_about_lever_arm(DispersionResult& result, const KnownPositions& places
 using CapturesFor =
     std::function<std::vector<ReferencePointCapture>(const Calibration& calibration)>;
 
-/// Propagates the errors of lens and zenith into the offset, if their covariances are known.
-void propagate_uncertainty(DispersionResult& result, const CapturesFor& captures_for,
-                           const LampCaptures& input, DispersionMethod method,
-                           DispersionCircle circle) {
-  Dispersion& dispersion = result.fit.dispersion;
-  const auto offset_for = [&](const Calibration& perturbed) -> std::optional<Eigen::VectorXd> {
-    const DispersionFit fit =
-        estimate_dispersion_offset(captures_for(perturbed), input.lamps, perturbed, method, circle);
-    if (fit.status != DispersionStatus::ok) return {};
-    return Eigen::VectorXd(fit.dispersion.offset_px.cwiseQuotient(perturbed.camera.focal_px()));
-  };
-  const Eigen::Vector2d nominal =
-      dispersion.offset_px.cwiseQuotient(input.calibration.camera.focal_px());
-  bool is_propagated = true;
-  if (const auto& report = input.calibration.intrinsics_report; report && report->covariance) {
-    const auto offset_for_lens_error = [&](const Eigen::VectorXd& error) {
-      return offset_for(add_error_to_calibrated_intrinsics(input.calibration, error));
-    };
-    dispersion.jacobian_wrt_intrinsics =
-        estimate_solution_jacobian_wrt_errors(offset_for_lens_error, nominal, *report->covariance);
-    is_propagated = dispersion.jacobian_wrt_intrinsics.has_value();
-  }
-  if (const auto& center = input.calibration.rotation_center; center && center->covariance) {
-    constexpr double min_step = 1e-5;  // smallest step: second-order error 1e-10
-    const double sd =
-        std::sqrt(center->covariance->trace()) / input.calibration.camera.focal_px().x();
-    const double step = std::max(min_step, sd);
-    const auto offset_for_zenith_error = [&](const Eigen::VectorXd& error) {
-      return offset_for(add_error_to_calibrated_zenith(input.calibration, error));
-    };
-    const auto jacobian_wrt_zenith = estimate_solution_jacobian_wrt_errors(
-        offset_for_zenith_error, nominal, step * step * Eigen::Matrix2d::Identity());
-    if (jacobian_wrt_zenith) dispersion.jacobian_wrt_zenith = *jacobian_wrt_zenith;
-    is_propagated = is_propagated && jacobian_wrt_zenith;
-  }
-  if (is_propagated) return;
-  result.warnings.emplace_back(
-      "the effect of lens and zenith errors on the offset cannot be determined, and sd of fixes "
-      "will lack part of it; use vlp-adjust");
+/// Adds errors of the lens, zenith and lever arm, as far as `joint` has them, to a calibration.
+Calibration add_errors(const JointCovariance& joint, Calibration calibration,
+                       const Eigen::VectorXd& errors) {
+  const Eigen::Index lens = count_intrinsics_with_covariance(calibration.camera);
+  if (joint.find_row("fx"))
+    calibration = add_error_to_calibrated_intrinsics(std::move(calibration), errors.head(lens));
+  if (const auto row = joint.find_row(kZenithParameter))
+    calibration = add_error_to_calibrated_zenith(std::move(calibration), errors.segment<2>(*row));
+  const auto arm = joint.find_row(kLeverArmParameter);
+  if (arm && calibration.rotation_center->lever_arm_m)
+    *calibration.rotation_center->lever_arm_m += errors.segment<2>(*arm);
+  return calibration;
 }
 
-/// Adds the covariance of the lever arm, without its part that depends on the zenith, to that of
-/// the offset. Places of the axis have the uncertainty of the lever arm.
-void add_lever_arm_covariance(Dispersion& dispersion, const LampCaptures& input, double height_m) {
-  const RotationCenter& center = *input.calibration.rotation_center;
-  if (!center.lever_arm_covariance || !dispersion.covariance || !(height_m > 0)) return;
-  const Eigen::Vector2d focal_px = input.calibration.camera.focal_px();
-  Matrix2 covariance_m2 = *center.lever_arm_covariance;
-  if (center.lever_arm_jacobian_wrt_zenith && center.covariance) {
-    const Matrix2 per_px =
-        *center.lever_arm_jacobian_wrt_zenith * focal_px.cwiseInverse().asDiagonal();
-    covariance_m2 -= per_px * *center.covariance * per_px.transpose();
+/// Adds the offset to the joint covariance; std::nullopt if its errors are unknown.
+std::optional<JointCovariance> compute_joint_covariance(
+    DispersionResult& result, const CapturesFor& captures_for, const LampCaptures& input,
+    const Calibration& leveled, DispersionMethod method, DispersionCircle circle) {
+  const DispersionFit& fit = result.fit;
+  if (!fit.covariance) return leveled.covariance;
+  const auto offset_for = [&](const Calibration& perturbed) -> std::optional<Eigen::VectorXd> {
+    const DispersionFit other =
+        estimate_dispersion_offset(captures_for(perturbed), input.lamps, perturbed, method, circle);
+    if (other.status != DispersionStatus::ok) return {};
+    return Eigen::VectorXd(other.dispersion.offset_px.cwiseQuotient(perturbed.camera.focal_px()));
+  };
+  JointCovariance joint;
+  if (leveled.covariance) {
+    joint = *leveled.covariance;
+  } else if (!leveled.rotation_center) {
+    joint = make_lens_covariance(leveled);
   }
-  const Eigen::Vector2d px_per_m = focal_px / height_m;
-  const Matrix2 added = px_per_m.asDiagonal() * covariance_m2 * px_per_m.asDiagonal();
-  *dispersion.covariance += 0.5 * (added + added.transpose());
+  const Eigen::Index steps = joint.first_lamp_row();
+  std::optional<MatrixX> by_steps(MatrixX(2, 0));
+  if (steps > 0) {
+    MatrixX covariance = joint.matrix.topLeftCorner(steps, steps);
+    for (const std::string_view parameter : {kZenithParameter, kLeverArmParameter}) {
+      constexpr double min_step = 1e-5;  // smallest step: second-order error 1e-10
+      if (const auto row = joint.find_row(parameter))
+        covariance.diagonal().segment<2>(*row).array() += min_step * min_step;
+    }
+    by_steps = estimate_solution_jacobian_wrt_errors(
+        [&](const Eigen::VectorXd& errors) {
+          return offset_for(add_errors(joint, leveled, errors));
+        },
+        fit.dispersion.offset_px.cwiseQuotient(leveled.camera.focal_px()), covariance);
+  }
+  if (by_steps) {
+    return add_offset_to_covariance(std::move(joint), fit, *by_steps, leveled.camera.focal_px());
+  }
+  result.warnings.emplace_back(
+      "the effect of lens and zenith errors on the offset cannot be determined, and sd of fixes "
+      "will lack those of the offset; use vlp-adjust");
+  return leveled.covariance;
 }
 
 void warn_about_few_captures(DispersionResult& result, DispersionMethod method) {
@@ -212,8 +210,7 @@ DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
                                                  DispersionMethod method, DispersionCircle circle,
                                                  HistoryEntry entry) {
   DispersionResult result;
-  Calibration leveled = input.calibration;
-  leveled.dispersion.reset();
+  const Calibration leveled = remove_dispersion_from_calibration(input.calibration);
   check_lamp_map_with_captures(input, leveled, result);
   if (!result.has_succeeded()) return result;
   const bool of_axis = std::find(places.measured_points.begin(), places.measured_points.end(),
@@ -227,13 +224,11 @@ DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
     return result;
   }
   const CapturesFor captures_for = [&](const Calibration& calibration) {
-    if (!of_axis) return places.captures;
-    Calibration without = calibration;
-    without.dispersion.reset();
-    return move_reference_points_to_camera(places, input.lamps, without);
+    return of_axis ? move_reference_points_to_camera(places, input.lamps, calibration)
+                   : places.captures;
   };
   const std::vector<ReferencePointCapture> captures = captures_for(leveled);
-  result.fit = estimate_dispersion_offset(captures, input.lamps, input.calibration, method, circle);
+  result.fit = estimate_dispersion_offset(captures, input.lamps, leveled, method, circle);
   const DispersionFit& fit = result.fit;
   if (fit.status != DispersionStatus::ok) {
     set_dispersion_failure(result, input, leveled);
@@ -245,13 +240,9 @@ DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
   warn_about_few_captures(result, method);
   if (!of_axis) warn_about_lever_arm(result, places, input.lamps, leveled);
   result.metrics = make_dispersion_metrics(fit);
-  if (of_axis) {
-    add_lever_arm_covariance(result.fit.dispersion, input,
-                             compute_mean_height_m(places, input.lamps, leveled));
-  }
-  propagate_uncertainty(result, captures_for, input, method, circle);
-  result.calibration =
-      add_dispersion_to_calibration(input.calibration, fit.dispersion, std::move(entry));
+  auto covariance = compute_joint_covariance(result, captures_for, input, leveled, method, circle);
+  result.calibration = add_dispersion_to_calibration(input.calibration, fit.dispersion,
+                                                     std::move(covariance), std::move(entry));
   result.drawing = [fit] {
     return make_dispersion_plot_drawing(
         collect_dispersion_plot_data("Fixes at a reference point", fit));

@@ -12,7 +12,7 @@
 
 #include "geometry/median.h"
 #include "geometry/symmetric.h"
-#include "positioning/correlated_errors.h"
+#include "rig/calibration_error.h"
 
 namespace vlp {
 namespace {
@@ -36,7 +36,7 @@ class CommonUnknowns {
  public:
   CommonUnknowns(const LampMap& lamps, const Calibration& calibration) {
     if (calibration.rotation_center) {
-      const auto zenith = compute_zenith_covariance(calibration);
+      const auto zenith = find_parameter_covariance(calibration, kZenithParameter);
       if (zenith) tilt_sd_rad_ = std::sqrt(zenith->trace() / 2);
     }
     for (const Lamp& lamp : lamps.lamps) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <utility>
 
 #include "calibration/error_propagation.h"
@@ -46,30 +47,40 @@ Eigen::VectorXd make_solution_vector(const RotationCenter& center) {
   return solved;
 }
 
-/// Propagates the errors of the lens into zenith and lever arm, if the covariance of the lens is
-/// known. `center_for` estimates the center with another lens; std::nullopt if that fails.
-void propagate_lens_errors(
-    RotationCenter& center, const LampCaptures& input,
+/// Returns the joint covariance of lens, zenith and lever arm. `own` is that of zenith and lever
+/// arm with an exact lens; `center_for` estimates the center with another lens; std::nullopt if
+/// that fails.
+std::optional<JointCovariance> compute_joint_covariance(
+    const RotationCenter& center, const std::optional<MatrixX>& own, const LampCaptures& input,
     const std::function<std::optional<RotationCenter>(const Camera& camera)>& center_for,
     StepResult& result) {
-  const auto& report = input.calibration.intrinsics_report;
-  if (!report || !report->covariance) return;
-  const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
-    const auto moved = center_for(add_error_to_calibrated_intrinsics(
-                                      extract_camera_only_calibration(input.calibration), error)
-                                      .camera);
-    if (!moved || moved->lever_arm_m.has_value() != center.lever_arm_m.has_value()) return {};
-    return make_solution_vector(*moved);
-  };
-  if (const auto jacobian = estimate_solution_jacobian_wrt_errors(
-          with_error, make_solution_vector(center), *report->covariance)) {
-    center.jacobian_wrt_intrinsics = jacobian->topRows(2);
-    if (center.lever_arm_m) center.lever_arm_jacobian_wrt_intrinsics = jacobian->bottomRows(2);
-    return;
+  if (!own) return std::nullopt;
+  JointCovariance joint = make_lens_covariance(input.calibration);
+  std::optional<MatrixX> jacobian(MatrixX(own->rows(), 0));
+  if (!joint.parameters.empty()) {
+    const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
+      const auto moved = center_for(add_error_to_calibrated_intrinsics(
+                                        extract_camera_only_calibration(input.calibration), error)
+                                        .camera);
+      if (!moved || moved->lever_arm_m.has_value() != center.lever_arm_m.has_value()) return {};
+      return make_solution_vector(*moved);
+    };
+    jacobian = estimate_solution_jacobian_wrt_errors(with_error, make_solution_vector(center),
+                                                     joint.matrix);
   }
-  result.warnings.emplace_back(
-      "the effect of lens errors on the zenith cannot be determined, and sd of fixes will lack it; "
-      "use vlp-adjust");
+  if (!jacobian) {
+    result.warnings.emplace_back(
+        "the effect of lens errors on the zenith cannot be determined, and sd of fixes will lack "
+        "it; use vlp-adjust");
+    joint = {};
+    jacobian = MatrixX(own->rows(), 0);
+  }
+  std::vector<std::string> names;
+  for (const std::string_view first : {kZenithParameter, kLeverArmParameter})
+    std::ranges::copy(list_pair_names(first), std::back_inserter(names));
+  names.resize(static_cast<std::size_t>(own->rows()));
+  append_parameters(joint, names, *jacobian, *own);
+  return joint;
 }
 
 /// Returns true if two sets of captures have the same sightings in the same order.
@@ -83,10 +94,11 @@ bool has_same_observations(const RotationCaptures& a, const RotationCaptures& b)
                     });
 }
 
-/// Propagates the errors of the lens through a fit of the same sightings. A fit that rejects other
+/// Computes the joint covariance from fits of the same sightings. A fit that rejects other
 /// sightings changes by more than the lens causes.
-void propagate_lens_errors(RotationResult& result, const LampCaptures& input,
-                           RotationMethod method) {
+std::optional<JointCovariance> compute_joint_covariance(RotationResult& result,
+                                                        const LampCaptures& input,
+                                                        RotationMethod method) {
   const auto center_for = [&](const Camera& camera) -> std::optional<RotationCenter> {
     const RotationCaptures rotation =
         find_in_place_rotation_captures(input.frames, input.lamps, camera);
@@ -96,7 +108,8 @@ void propagate_lens_errors(RotationResult& result, const LampCaptures& input,
     if (!fit.converged || fit.used_observations != result.fit.used_observations) return {};
     return fit.center;
   };
-  propagate_lens_errors(result.fit.center, input, center_for, result);
+  return compute_joint_covariance(result.fit.center, result.fit.covariance, input, center_for,
+                                  result);
 }
 
 void add_warnings(RotationResult& result) {
@@ -113,7 +126,7 @@ void add_warnings(RotationResult& result) {
                     "heights: use --method axis, which estimates both",
                     heights.size()));
   }
-  if (!result.fit.center.covariance) {
+  if (!result.fit.covariance) {
     result.warnings.emplace_back(
         "three captures of a height leave no residuals, and the "
         "center has no standard deviation: add captures, four or more at each height");
@@ -130,7 +143,7 @@ void add_warnings(RotationResult& result) {
   }
 }
 
-void add_metrics(RotationResult& result) {
+void add_metrics(RotationResult& result, const Eigen::Vector2d& focal_px) {
   const RotationCenter& center = result.fit.center;
   result.metrics = {
       {"rotation_px", result.fit.residual_px},
@@ -138,8 +151,10 @@ void add_metrics(RotationResult& result) {
   if (!result.circles.circles.empty()) {
     result.metrics.push_back({"rotation_spread_px", result.circles.spread_px});
   }
-  if (const auto& covariance = center.covariance) {
-    result.metrics.push_back({"rotation_sd_px", std::sqrt(covariance->trace())});
+  if (const auto& covariance = result.fit.covariance) {
+    const Eigen::Vector2d variances_px2 =
+        focal_px.cwiseAbs2().cwiseProduct(covariance->diagonal().head<2>());
+    result.metrics.push_back({"rotation_sd_px", std::sqrt(variances_px2.sum())});
   }
   if (const auto& arm_m = center.lever_arm_m) {
     result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});
@@ -245,11 +260,11 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
                                        result);
     return result;
   }
-  propagate_lens_errors(result, input, method);
-  add_metrics(result);
+  auto covariance = compute_joint_covariance(result, input, method);
+  add_metrics(result, camera.focal_px());
   add_warnings(result);
-  result.calibration =
-      add_rotation_center_to_calibration(input.calibration, result.fit.center, std::move(entry));
+  result.calibration = add_rotation_center_to_calibration(input.calibration, result.fit.center,
+                                                          std::move(covariance), std::move(entry));
   const std::string title = fmt::format("{}, method {}", camera.id, rotation_method_name(method));
   result.drawing = [title, rotation = result.rotation, circles = result.circles, fit = result.fit,
                     camera] {
@@ -291,7 +306,8 @@ TiltResult run_tilt_calibration_step(const LampCaptures& input, bool refine_map,
     const TiltCalibration other = leveled(camera);
     return other.undetermined.empty() ? std::optional(other.center) : std::nullopt;
   };
-  propagate_lens_errors(leveling.center, input, center_for, result);
+  auto covariance =
+      compute_joint_covariance(leveling.center, leveling.covariance, input, center_for, result);
   result.metrics = {
       {"tilt_deg", deg_from_rad(compute_tilt_from_rotation_center(leveling.center).angle_rad)}};
   constexpr double max_noise_scale = 3;
@@ -302,8 +318,8 @@ TiltResult run_tilt_calibration_step(const LampCaptures& input, bool refine_map,
                     "is slightly wrong, and the error of the tilt may exceed its sd{}",
                     leveling.noise_scale, refine_map ? "" : "; --refine-map may help"));
   }
-  result.calibration =
-      add_rotation_center_to_calibration(input.calibration, leveling.center, std::move(entry));
+  result.calibration = add_rotation_center_to_calibration(input.calibration, leveling.center,
+                                                          std::move(covariance), std::move(entry));
   return result;
 }
 

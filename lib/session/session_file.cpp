@@ -13,7 +13,6 @@
 #include "captures/shared_folder.h"
 #include "evaluation/junit.h"
 #include "geometry/angles.h"
-#include "positioning/correlated_errors.h"
 #include "rig/calibration_error.h"
 #include "rig/file.h"
 
@@ -44,15 +43,18 @@ Json make_calibration_json(const Calibration& calibration) {
   if (const auto& center = calibration.rotation_center) {
     const auto [angle_rad, azimuth_rad] = compute_tilt_from_rotation_center(*center);
     json["rotation_center_px"] = {center->center_px.x(), center->center_px.y()};
-    json["rotation_center_sd_px"] = make_sd_json(center->covariance, 1);
+    json["rotation_center_sd_px"] =
+        make_sd_json(compute_rotation_center_covariance(calibration), 1);
     json["tilt_deg"] = deg_from_rad(angle_rad);
     json["tilt_azimuth_deg"] = deg_from_rad(azimuth_rad);
     const Eigen::Vector2d zenith = compute_normalized_zenith_point(*center);
     json["zenith_deg"] = {kDegrees * zenith.x(), kDegrees * zenith.y()};
-    json["zenith_sd_deg"] = make_sd_json(compute_zenith_covariance(calibration), kDegrees);
+    json["zenith_sd_deg"] =
+        make_sd_json(find_parameter_covariance(calibration, kZenithParameter), kDegrees);
     if (const auto& arm_m = center->lever_arm_m) {
       json["lever_arm_mm"] = {kMillimetersPerMeter * arm_m->x(), kMillimetersPerMeter * arm_m->y()};
-      json["lever_arm_sd_mm"] = make_sd_json(center->lever_arm_covariance, kMillimetersPerMeter);
+      json["lever_arm_sd_mm"] = make_sd_json(
+          find_parameter_covariance(calibration, kLeverArmParameter), kMillimetersPerMeter);
     }
   }
   if (const auto& dispersion = calibration.dispersion) {

@@ -224,17 +224,20 @@ Trial make_trial(const StepResult& result) {
           .is_warned = result.has_succeeded() && has_warning(result)};
 }
 
-void add_center_errors(Trial& trial, const RotationCenter& found, const RotationCenter& truth) {
-  if (!found.covariance) return;
-  trial.errors.push_back(normalize(found.center_px - truth.center_px, *found.covariance));
+void add_center_errors(Trial& trial, const Calibration& found, const RotationCenter& truth) {
+  const auto covariance_px2 = compute_rotation_center_covariance(found);
+  if (!covariance_px2) return;
+  trial.errors.push_back(
+      normalize(found.rotation_center->center_px - truth.center_px, *covariance_px2));
 }
 
-void add_lever_arm_errors(Trial& trial, const RotationCenter& found, const Eigen::Vector2d& arm_m) {
-  if (!found.lever_arm_m || !found.lever_arm_covariance) {
+void add_lever_arm_errors(Trial& trial, const Calibration& found, const Eigen::Vector2d& arm_m) {
+  const auto covariance_m2 = find_parameter_covariance(found, kLeverArmParameter);
+  if (!covariance_m2) {
     trial.errors.clear();
     return;
   }
-  trial.errors.push_back(normalize(*found.lever_arm_m - arm_m, *found.lever_arm_covariance));
+  trial.errors.push_back(normalize(*found.rotation_center->lever_arm_m - arm_m, *covariance_m2));
 }
 
 Trial try_rotation(const Cell& cell, Random& random, RotationMethod method, double tilt_rad,
@@ -251,9 +254,9 @@ Trial try_rotation(const Cell& cell, Random& random, RotationMethod method, doub
   const RotationResult result = run_rotation_calibration_step(input, method, {});
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
-  add_center_errors(trial, result.fit.center, room.center());
+  add_center_errors(trial, result.calibration, room.center());
   if (method == RotationMethod::axis) {
-    add_lever_arm_errors(trial, result.fit.center, turn.lever_arm_m);
+    add_lever_arm_errors(trial, result.calibration, turn.lever_arm_m);
   }
   return trial;
 }
@@ -277,7 +280,7 @@ Trial try_lamps(const Cell& cell, Random& random) {
   }
   const TiltResult result = run_tilt_calibration_step(input, false, {});
   Trial trial = make_trial(result);
-  if (trial.has_result) add_center_errors(trial, result.tilt.center, room.center());
+  if (trial.has_result) add_center_errors(trial, result.calibration, room.center());
   return trial;
 }
 
@@ -308,8 +311,7 @@ Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) 
   const DispersionFit truth = estimate_dispersion_offset(exact, room.true_map(), believed, method);
   if (!trial.has_result || truth.status != DispersionStatus::ok) return trial;
   const Dispersion& found = result.fit.dispersion;
-  const auto covariance_px2 =
-      compute_dispersion_offset_covariance_with_map_errors(found, believed.camera.focal_px());
+  const auto covariance_px2 = compute_dispersion_offset_covariance(result.calibration);
   if (!covariance_px2) return trial;
   trial.errors.push_back(normalize(found.offset_px - truth.dispersion.offset_px, *covariance_px2));
   return trial;
@@ -350,8 +352,11 @@ Trial try_adjustment(const Cell& cell, Random& random) {
   const AdjustStepResult result = run_joint_adjustment_step(input, {});
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
-  add_center_errors(trial, result.adjustment.center, room.center());
-  add_lever_arm_errors(trial, result.adjustment.center, turn.lever_arm_m);
+  add_center_errors(trial, result.calibration, room.center());
+  if (result.adjustment.center.lever_arm_m)
+    add_lever_arm_errors(trial, result.calibration, turn.lever_arm_m);
+  else
+    trial.errors.clear();
   return trial;
 }
 

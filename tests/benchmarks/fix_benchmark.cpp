@@ -12,6 +12,7 @@
 
 #include "positioning/positioner.h"
 #include "positioning/vlp.h"
+#include "rig/calibration_error.h"
 #include "support/body_rig.h"
 #include "support/synthetic_rig.h"
 
@@ -72,10 +73,11 @@ void fix_with_the_common_part(benchmark::State& state) {
   Scene scene = make_scene(static_cast<std::size_t>(state.range(0)));
   SyntheticRig& rig = scene.rig;
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
-  rig.calibration.rotation_center->covariance = 1e-4 * Eigen::Matrix2d::Identity();
-  rig.calibration.rotation_center->jacobian_wrt_intrinsics = MatrixX::Constant(2, 12, 1e-3);
   rig.calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, {}};
   rig.calibration.intrinsics_report->covariance = 1e-6 * MatrixX::Identity(12, 12);
+  rig.calibration.covariance = make_lens_covariance(rig.calibration);
+  append_parameters(*rig.calibration.covariance, list_pair_names(kZenithParameter),
+                    MatrixX::Constant(2, 12, 1e-3), 4e-10 * Matrix2::Identity());
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.001;
   Random random(1);
   scene.detections = with_noise(seen_from(rig, 0.1), random);

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <numeric>
 #include <span>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "geometry/symmetric.h"
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
+#include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
 #include "support/matchers.h"
 #include "support/station_verdicts.h"
@@ -147,10 +149,10 @@ INSTANTIATE_TEST_SUITE_P(Stated, UnitErrorsParts, testing::Values(adjusted(), in
 
 TEST(UnitErrors, BudgetTermIsZeroForQuantityWithoutError) {
   StatedRig rig = adjusted();
-  MatrixX& covariance = rig.calibration.adjustment->covariance;
+  MatrixX& covariance = rig.calibration.covariance->matrix;
   const auto without = [&](Eigen::Index first, Eigen::Index size) {
     StatedRig other = rig;
-    MatrixX& left = other.calibration.adjustment->covariance;
+    MatrixX& left = other.calibration.covariance->matrix;
     left.middleRows(first, size).setZero();
     left.middleCols(first, size).setZero();
     return compute_unit_fix_error_budget(other);
@@ -174,7 +176,7 @@ TEST(CommonErrors, IsolatedErrorSourceIsUnknownIfItsVarianceIsZero) {
         .are_any_errors_known();
   };
   EXPECT_TRUE(is_lens_error_known());
-  MatrixX& covariance = rig.calibration.adjustment->covariance;
+  MatrixX& covariance = rig.calibration.covariance->matrix;
   covariance.topRows(12).setZero();
   covariance.leftCols(12).setZero();
   EXPECT_FALSE(is_lens_error_known());
@@ -195,21 +197,17 @@ TEST(UnitErrors, BudgetExistsOnlyForLampsAboveCamera) {
 
 /// Each part of sequential steps results from the covariance of one step alone.
 TEST(UnitErrors, BudgetTermEqualsBudgetWithOnlyThatError) {
-  const StatedRig rig = in_a_row();
-  const UnitBudget whole = compute_unit_fix_error_budget(rig);
-  StatedRig only_lens = rig, only_zenith = rig, only_offset = rig, only_map = rig;
-  const auto clear = [](StatedRig& one, bool lens, bool zenith, bool offset, bool map) {
-    if (!lens) one.calibration.intrinsics_report->covariance->setZero();
-    if (!zenith) one.calibration.rotation_center->covariance->setZero();
-    if (!offset) one.calibration.dispersion->covariance->setZero();
-    for (Lamp& lamp : one.map.lamps) lamp.sd_m = map ? *lamp.sd_m : 0;
-    return compute_unit_fix_error_budget(one).common_covariance();
+  const UnitBudget whole = compute_unit_fix_error_budget(in_a_row());
+  const auto compute_with = [](std::array<double, 4> errors) {
+    StatedRig rig;
+    rig.calibrate_in_a_row(errors);
+    return compute_unit_fix_error_budget(rig).common_covariance();
   };
   const double small = 1e-9 * whole.common_covariance().cwiseAbs().maxCoeff();
-  EXPECT_THAT(whole.lens, IsNear(clear(only_lens, true, false, false, false), small));
-  EXPECT_THAT(whole.zenith, IsNear(clear(only_zenith, false, true, false, false), small));
-  EXPECT_THAT(whole.offset, IsNear(clear(only_offset, false, false, true, false), small));
-  EXPECT_THAT(whole.lamp_map, IsNear(clear(only_map, false, false, false, true), small));
+  EXPECT_THAT(whole.lens, IsNear(compute_with({1, 0, 0, 0}), small));
+  EXPECT_THAT(whole.zenith, IsNear(compute_with({0, 1, 0, 0}), small));
+  EXPECT_THAT(whole.offset, IsNear(compute_with({0, 0, 1, 0}), small));
+  EXPECT_THAT(whole.lamp_map, IsNear(compute_with({0, 0, 0, 1}), small));
 }
 
 /// Fixes with calibrations and maps drawn from the reported covariance, and with pixel noise.
@@ -217,7 +215,7 @@ TEST(UnitErrors, BudgetMatchesFixErrorsOfRandomlyDrawnCalibrations) {
   const StatedRig rig = adjusted();
   const UnitBudget budget = compute_unit_fix_error_budget(rig);
   const auto exact = make_detections(rig);
-  const Eigen::MatrixXd root = rig.calibration.adjustment->covariance.llt().matrixL();
+  const Eigen::MatrixXd root = rig.calibration.covariance->matrix.llt().matrixL();
   Random random(11);
   NeesStatistics nees;
   Eigen::Matrix4d scatter = Eigen::Matrix4d::Zero();
@@ -230,6 +228,7 @@ TEST(UnitErrors, BudgetMatchesFixErrorsOfRandomlyDrawnCalibrations) {
         add_error_to_calibrated_intrinsics(rig.calibration, error.head<12>()),
         error.segment<2>(12));
     calibration.adjustment.reset();
+    calibration.covariance.reset();
     LampMap map = rig.map;
     for (std::size_t i = 0; i < 8; ++i) {
       map.lamps[i].position_m += error.segment<3>(16 + 3 * static_cast<Eigen::Index>(i));
@@ -269,7 +268,9 @@ TEST(UnitErrors, IsErrorSourceKnownOrAbsentIsFalseForSourcesWithoutSd) {
   rig = in_a_row();
   for (const CommonErrorSource part : kCommonErrorSources) EXPECT_TRUE(stated(part));
   rig.map.lamps[3].sd_m.reset();
-  rig.calibration.dispersion->covariance.reset();
+  const Dispersion dispersion = *rig.calibration.dispersion;
+  rig.calibration = remove_dispersion_from_calibration(rig.calibration);
+  rig.calibration.dispersion = dispersion;
   EXPECT_FALSE(stated(CommonErrorSource::lamps) || stated(CommonErrorSource::offset));
 }
 

@@ -25,7 +25,7 @@ class VlpDispersion : public testing::Test {
     rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
     believed = rig.calibration;
     believed.rotation_center = tilted_by(believed.camera, 0.02, 1.5);
-    believed.dispersion = Dispersion{{50, 50}, 0, {0, 0}, 1, {}};  // an old one
+    believed.dispersion = Dispersion{{50, 50}, 0, {0, 0}, 1};  // an old one
     write_lamp_map(folder / "lamps.yaml", rig.map);
     write_calibration(folder / "rotated.yaml", believed);
   }

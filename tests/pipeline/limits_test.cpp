@@ -129,8 +129,9 @@ class VlpLimitsFromCalibration : public testing::Test {
 
   VlpLimitsFromCalibration() {
     RotationCenter center = tilted_by(calibration.camera, 0.02, 1);
-    center.covariance = 1e-4 * Eigen::Matrix2d::Identity();
-    calibration = add_rotation_center_to_calibration(calibration, center, {});
+    calibration = add_rotation_center_to_calibration(
+        calibration, center,
+        JointCovariance{{}, {"zenith_x", "zenith_y"}, 4e-10 * Eigen::Matrix2d::Identity()}, {});
     for (Lamp& lamp : lamps.lamps) lamp.sd_m = 0.002;
   }
   ProgramResult run(const std::string& options) {
@@ -163,6 +164,7 @@ TEST_F(VlpLimitsFromCalibration, NamesLargestErrorSource) {
 
 TEST_F(VlpLimitsFromCalibration, IncludesOnlyLensUncertaintyWithoutRotationCenter) {
   calibration.rotation_center.reset();
+  calibration.covariance.reset();
   calibration.history.clear();  // it names the center
   calibration.intrinsics_report = IntrinsicsReport{10, 1000, 0, 0.1, {}, {}};
   calibration.intrinsics_report->covariance = MatrixX(1e-6 * MatrixX::Identity(12, 12));
@@ -179,6 +181,9 @@ TEST_F(VlpLimitsFromCalibration, WarnsOfLampsMovedSinceAdjustment) {
   rig.adjust(1);
   lamps = rig.map;
   calibration.adjustment = rig.calibration.adjustment;
+  calibration.covariance = rig.calibration.covariance;
+  calibration.intrinsics_report = IntrinsicsReport{10, 1000, 0, 0.1, {}, {}};
+  calibration.intrinsics_report->covariance = calibration.covariance->matrix.topLeftCorner(12, 12);
   calibration.adjustment->sets = {"turn"};
   EXPECT_THAT(run("--from-calibration").errors, Not(HasSubstr("elsewhere")));
   lamps.lamps[2].position_m.x() += 0.01;
@@ -191,7 +196,7 @@ TEST_F(VlpLimitsFromCalibration, WarnsOfLampsMovedSinceAdjustment) {
 
 TEST_F(VlpLimitsFromCalibration, RejectsTiltOptionAndCalibrationWithoutUncertainties) {
   EXPECT_EQ(run("--from-calibration --tilt-deg 1").exit_code, 2);
-  calibration.rotation_center->covariance.reset();
+  calibration.covariance.reset();
   for (Lamp& lamp : lamps.lamps) lamp.sd_m.reset();
   const auto result = run("--from-calibration");
   EXPECT_EQ(result.exit_code, 2);

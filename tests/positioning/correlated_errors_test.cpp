@@ -12,6 +12,7 @@
 
 #include "positioning/positioner.h"
 #include "positioning/stated_rig.h"
+#include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
 #include "support/body_rig.h"
 #include "support/matchers.h"
@@ -55,7 +56,7 @@ TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
   rig.adjust(1);
   rig.calibration.camera.row_time_s = 3e-5;
   rig.calibration.camera.readout = Readout::rows;
-  const Adjustment adjustment = *rig.calibration.adjustment;
+  const MatrixX covariance = rig.calibration.covariance->matrix;
   // The mount displaces and rotates the camera relative to the base.
   PositionerOptions options;
   if (known.motion) options.mount = CameraMount{{0.3, -0.2, 0.15}, 0.5};
@@ -77,7 +78,6 @@ TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
       map.lamps[static_cast<std::size_t>(parameter - 16) / 3].position_m[(parameter - 16) % 3] +=
           by;
     }
-    other.adjustment.reset();
     return to_states(Positioner(map, other, options).compute_position_fix(detections, known));
   };
   Eigen::MatrixXd by_parameters(kBodyStates, 40);
@@ -88,8 +88,9 @@ TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
   const Fix fix =
       Positioner(rig.map, rig.calibration, options).compute_position_fix(detections, known);
   ASSERT_TRUE(fix.has_succeeded());
-  expect_common(fix, by_parameters, adjustment.covariance);
+  expect_common(fix, by_parameters, covariance);
   rig.calibration.adjustment.reset();
+  rig.calibration.covariance.reset();
   const Fix noise =
       Positioner(rig.map, rig.calibration, options).compute_position_fix(detections, known);
   EXPECT_EQ(noise.covariance, noise.noise_covariance);
@@ -138,6 +139,7 @@ TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUnce
   rig.calibrate_in_a_row();
   rig.calibration.rotation_center.reset();
   rig.calibration.dispersion.reset();
+  rig.calibration.covariance.reset();
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m.reset();
   const MatrixX covariance = *rig.calibration.intrinsics_report->covariance;
   const auto detections = seen_from(rig, 0.1);
@@ -157,8 +159,8 @@ TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUnce
   expect_common(fix, by_parameters, covariance);
 }
 
-/// A part without derivatives by the lens hides the errors of the lens.
-TEST_F(CommonErrorsTest, LensErrorsAreUnknownIfAppliedCorrectionHasNoJacobianWrtLens) {
+/// A step whose joint covariance lacks the lens hides the errors of the lens.
+TEST_F(CommonErrorsTest, LensErrorsAreUnknownIfAppliedStepIsIndependentOfLens) {
   const auto stated = [&](Correction correction) {
     return CommonErrors(rig.map.lamps, rig.calibration, correction)
         .is_error_source_known_or_absent(CommonErrorSource::lens);
@@ -168,12 +170,26 @@ TEST_F(CommonErrorsTest, LensErrorsAreUnknownIfAppliedCorrectionHasNoJacobianWrt
        {Correction::none, Correction::rotation, Correction::dispersion, Correction::all}) {
     EXPECT_TRUE(stated(correction));
   }
-  rig.calibration.rotation_center->jacobian_wrt_intrinsics.reset();
-  EXPECT_FALSE(stated(Correction::rotation) || stated(Correction::all));
-  EXPECT_TRUE(stated(Correction::dispersion));
-  rig.calibration.dispersion->jacobian_wrt_intrinsics.reset();
-  EXPECT_FALSE(stated(Correction::dispersion));
+  rig.calibration.covariance = {{}, {"zenith_x", "zenith_y"}, Matrix2::Identity()};
+  for (const Correction correction :
+       {Correction::rotation, Correction::dispersion, Correction::all}) {
+    EXPECT_FALSE(stated(correction));
+  }
   EXPECT_TRUE(stated(Correction::none));
+}
+
+/// An offset whose own errors are unknown moves against the error of the zenith.
+TEST_F(CommonErrorsTest, DispersionOffsetWithUnknownErrorsCompensatesZenith) {
+  rig.calibrate_in_a_row();
+  rig.calibration.covariance = remove_dispersion_from_calibration(rig.calibration).covariance;
+  const CommonErrors errors(rig.map.lamps, rig.calibration, Correction::all);
+  const MatrixX& joint = errors.joint_error_covariance();
+  ASSERT_EQ(joint.rows(), 16);
+  EXPECT_FALSE(errors.is_error_source_known_or_absent(CommonErrorSource::offset));
+  EXPECT_TRUE(errors.is_error_source_known_or_absent(CommonErrorSource::zenith));
+  EXPECT_GT(joint(12, 12), 0);
+  EXPECT_EQ(joint.row(14), -joint.row(12));
+  EXPECT_EQ(joint.col(15), -joint.col(13));
 }
 
 TEST_F(CommonErrorsTest, FixCovarianceIncludesSurveySdOfLamps) {
@@ -185,17 +201,19 @@ TEST_F(CommonErrorsTest, FixCovarianceIncludesSurveySdOfLamps) {
   EXPECT_NEAR(std::sqrt(common(0, 0)), 0.00075, 0.00008);
 }
 
-/// Lamps of a dispersion have rows in the joint covariance; a derivative of 0 adds no error to it.
-TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByDispersionLampsWithZeroJacobian) {
+/// Lamps of the joint covariance without correlation have the same effect as those of the survey.
+TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByUncorrelatedLampsOfJointCovariance) {
   rig.calibrate_in_a_row();
+  rig.calibration = remove_dispersion_from_calibration(rig.calibration);
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
-  rig.calibration.dispersion->uncertain_lamps.clear();
   const auto detections = seen_from(rig, 0.1);
   const Fix without = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
   const CommonErrors small(rig.map.lamps, rig.calibration, Correction::all);
+  JointCovariance& joint = *rig.calibration.covariance;
   for (const Lamp& lamp : rig.map.lamps) {
-    rig.calibration.dispersion->uncertain_lamps.push_back(
-        {lamp.id, lamp.position_m, *lamp.sd_m, Eigen::Matrix<double, 2, 3>::Zero()});
+    joint.lamps.push_back({lamp.id, lamp.position_m});
+    append_parameters(joint, list_lamp_parameter_names(lamp.id),
+                      MatrixX::Zero(3, joint.matrix.rows()), 4e-6 * Eigen::Matrix3d::Identity());
   }
   const CommonErrors large(rig.map.lamps, rig.calibration, Correction::all);
   EXPECT_EQ(small.joint_error_covariance().rows(), small.num_shared_errors());
@@ -210,21 +228,19 @@ TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByDispersionLampsWithZeroJacobi
 }
 
 /// The offset depends on a lamp of the adjustment, whose error is not in the survey.
-TEST_F(CommonErrorsTest, DispersionOffsetCovarianceIncludesErrorOfAdjustedLamp) {
+TEST_F(CommonErrorsTest, DispersionOffsetIsCorrelatedWithAdjustedLamp) {
   rig.adjust(1);
-  Eigen::Matrix<double, 2, 3> by_position;
-  by_position << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
-  Dispersion& dispersion = rig.calibration.dispersion.emplace();
-  dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
-  dispersion.jacobian_wrt_zenith = Eigen::Matrix2d::Zero();
-  dispersion.uncertain_lamps = {{2, rig.map.lamps[1].position_m, 0.001, by_position}};
+  MatrixX jacobian = MatrixX::Zero(2, 40);
+  jacobian.middleCols<3>(19) << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
+  JointCovariance& joint = *rig.calibration.covariance;
+  append_parameters(joint, list_pair_names(kOffsetParameter), jacobian, Matrix2::Zero());
+  rig.calibration.dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
   const CommonErrors errors(rig.map.lamps, rig.calibration, Correction::all);
-  const Eigen::Matrix3d lamp = rig.calibration.adjustment->covariance.block<3, 3>(19, 19);
-  ASSERT_EQ(errors.joint_error_covariance().rows(), 12 + 2 + 2 + 24);
-  const Eigen::Matrix2d offset = errors.joint_error_covariance().block<2, 2>(14, 14);
-  const Eigen::Matrix<double, 2, 3> mixed = errors.joint_error_covariance().block<2, 3>(14, 19);
-  EXPECT_THAT(offset, IsNear((by_position * lamp * by_position.transpose()).eval(), 1e-18));
-  EXPECT_THAT(mixed, IsNear((by_position * lamp).eval(), 1e-18));
+  const MatrixX& found = errors.joint_error_covariance();
+  ASSERT_EQ(found.rows(), 12 + 2 + 2 + 24);
+  EXPECT_EQ((found.block<2, 2>(14, 14)), (joint.matrix.block<2, 2>(40, 40)));
+  EXPECT_EQ((found.block<2, 3>(14, 19)), (joint.matrix.block<2, 3>(40, 19)));
+  EXPECT_EQ((found.block<2, 14>(14, 0)), (joint.matrix.block<2, 14>(40, 0)));
   EXPECT_EQ(errors.num_lamps_moved_since_calibration(), 0);
   rig.map.lamps[1].position_m.x() += 1e-5;
   EXPECT_EQ(CommonErrors(rig.map.lamps, rig.calibration, Correction::all)
@@ -294,85 +310,6 @@ TEST_F(CommonErrorsTest, PositionFixRejectsLampMovedBy30MmAmongFour) {
   ASSERT_TRUE(fix.has_succeeded());
   EXPECT_EQ(fix.rejected_lamps, 1);
   EXPECT_EQ(fix.rejected_ids[0], 2);
-}
-
-/// Sequential steps; all covariances are combined by hand.
-class StepCovariance : public testing::Test {
- protected:
-  StatedRig rig;
-  Calibration& calibration = rig.calibration;
-
-  void SetUp() override { rig.calibrate_in_a_row(); }
-  Eigen::Matrix2d per_focal(const Matrix2& covariance_px) const {
-    const Eigen::Vector2d inverse = calibration.camera.focal_px().cwiseInverse();
-    return inverse.asDiagonal() * covariance_px * inverse.asDiagonal();
-  }
-  MatrixX lens() const { return *calibration.intrinsics_report->covariance; }
-  static void expect_equal(const std::optional<Matrix2>& found, const Eigen::Matrix2d& expected) {
-    ASSERT_TRUE(found);
-    EXPECT_THAT(*found, IsNear(expected, 1e-12 * expected.norm()));
-  }
-};
-
-class ComputeZenithCovariance : public StepCovariance {};
-class ComputeDispersionOffsetCovariance : public StepCovariance {};
-
-TEST_F(ComputeZenithCovariance, SumsCovariancesOfCapturesAndLensUnlessAdjusted) {
-  const RotationCenter& center = *calibration.rotation_center;
-  const MatrixX by_lens = *center.jacobian_wrt_intrinsics;
-  expect_equal(compute_zenith_covariance(calibration),
-               per_focal(*center.covariance) + by_lens * lens() * by_lens.transpose());
-  calibration.intrinsics_report.reset();
-  expect_equal(compute_zenith_covariance(calibration), per_focal(*center.covariance));
-  rig.adjust(1);
-  expect_equal(compute_zenith_covariance(calibration),
-               calibration.adjustment->covariance.block<2, 2>(12, 12));
-}
-
-TEST_F(ComputeZenithCovariance, ReturnsNulloptWithoutCovarianceOrLensDerivatives) {
-  calibration.rotation_center->jacobian_wrt_intrinsics.reset();
-  EXPECT_FALSE(compute_zenith_covariance(calibration));
-  SetUp();
-  calibration.rotation_center->covariance.reset();
-  EXPECT_FALSE(compute_zenith_covariance(calibration));
-}
-
-TEST_F(ComputeDispersionOffsetCovariance, SumsCovariancesOfCapturesLensZenithAndLamps) {
-  Dispersion& dispersion = *calibration.dispersion;
-  Eigen::Matrix<double, 2, 3> by_position;
-  by_position << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
-  dispersion.uncertain_lamps = {{1, rig.map.lamps[0].position_m, 0.002, by_position}};
-  const Eigen::Vector2d focal_px = calibration.camera.focal_px();
-  const MatrixX by_lens =
-      *dispersion.jacobian_wrt_intrinsics +
-      *dispersion.jacobian_wrt_zenith * *calibration.rotation_center->jacobian_wrt_intrinsics;
-  const Eigen::Matrix2d expected =
-      per_focal(*dispersion.covariance) + by_lens * lens() * by_lens.transpose() +
-      *dispersion.jacobian_wrt_zenith * per_focal(*calibration.rotation_center->covariance) *
-          dispersion.jacobian_wrt_zenith->transpose() +
-      0.002 * 0.002 * by_position * by_position.transpose();
-  expect_equal(compute_dispersion_offset_covariance(calibration),
-               focal_px.asDiagonal() * expected * focal_px.asDiagonal());
-}
-
-TEST_F(ComputeDispersionOffsetCovariance, ReturnsNulloptWithoutRequiredCovariancesOrDerivatives) {
-  EXPECT_TRUE(compute_dispersion_offset_covariance(calibration));
-  calibration.dispersion->jacobian_wrt_zenith.reset();
-  EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
-  SetUp();
-  calibration.dispersion->jacobian_wrt_intrinsics.reset();
-  EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
-  SetUp();
-  calibration.dispersion->covariance.reset();
-  EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
-  SetUp();
-  calibration.rotation_center->covariance.reset();
-  EXPECT_FALSE(compute_dispersion_offset_covariance(calibration));
-  calibration.rotation_center.reset();
-  calibration.intrinsics_report.reset();
-  calibration.dispersion->jacobian_wrt_intrinsics.reset();
-  const auto alone = compute_dispersion_offset_covariance(calibration);
-  expect_equal(alone, *calibration.dispersion->covariance);
 }
 
 }  // namespace

@@ -5,9 +5,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "positioning/vlp.h"
+#include "rig/calibration_error.h"
 #include "support/body_rig.h"
 #include "support/matchers.h"
 #include "support/temporary_folder.h"
@@ -158,9 +161,19 @@ class CameraAboveUncertainLamps : public CameraAboveLamps {
  protected:
   CameraAboveUncertainLamps() { rig.map.lamps.resize(2); }
 
+  void set_lamp_covariance(const Eigen::MatrixXd& covariance) {
+    JointCovariance& joint = rig.calibration.covariance.emplace();
+    for (const Lamp& lamp : rig.map.lamps) {
+      joint.lamps.push_back({lamp.id, lamp.position_m});
+      std::ranges::move(list_lamp_parameter_names(lamp.id), std::back_inserter(joint.parameters));
+    }
+    joint.matrix = covariance;
+  }
+
   /// Compares the covariance of the fix with that of the lamps' positions, propagated by
   /// derivatives of the fix. A dispersion offset changes with the positions.
-  void expect_propagated(const Eigen::MatrixXd& lamp_covariance) const {
+  void expect_propagated(const Eigen::MatrixXd& lamp_covariance,
+                         const Eigen::Matrix<double, 2, 6>& offset_by_lamps = {}) const {
     constexpr double step_m = 1e-4;
     const auto detections = seen_from(rig, 1e-3);
     ASSERT_EQ(detections.size(), 2U);
@@ -175,8 +188,9 @@ class CameraAboveUncertainLamps : public CameraAboveLamps {
       other.map.lamps[lamp].position_m[i % 3] += step_m;
       if (auto& dispersion = other.calibration.dispersion) {
         dispersion->offset_px +=
-            step_m * other.calibration.camera.focal_px().cwiseProduct(
-                         dispersion->uncertain_lamps[lamp].jacobian_wrt_position.col(i % 3));
+            step_m *
+            other.calibration.camera.focal_px().cwiseProduct(
+                offset_by_lamps.middleCols<3>(3 * static_cast<Eigen::Index>(lamp)).col(i % 3));
       }
       const Pose pose = other.positioner().compute_position_fix(detections).state.pose;
       derivatives.col(i) << (pose.position_m - fix.state.pose.position_m) / step_m,
@@ -198,25 +212,21 @@ TEST_F(CameraAboveUncertainLamps, CovarianceIncludesErrorsOfAdjustedLamps) {
   Random random(5);
   for (double& value : factors.reshaped()) value = random.uniform(-0.01, 0.01);
   const Eigen::MatrixXd covariance = factors * factors.transpose();
-  Adjustment& adjustment = rig.calibration.adjustment.emplace();
-  for (const Lamp& lamp : rig.map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
-  adjustment.covariance = Eigen::MatrixXd::Zero(12 + 4 + 6, 12 + 4 + 6);
-  adjustment.covariance.bottomRightCorner<6, 6>() = covariance;
+  rig.calibration.adjustment = Adjustment{{}, 1, 1, 0.1};
+  set_lamp_covariance(covariance);
   expect_propagated(covariance);
 }
 
 TEST_F(CameraAboveUncertainLamps, CovarianceIncludesErrorsOfDispersionOffsetByLamps) {
-  Dispersion& dispersion = rig.calibration.dispersion.emplace();
-  dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
-  dispersion.jacobian_wrt_zenith = Eigen::Matrix2d::Zero();
-  Eigen::Matrix<double, 2, 3> jacobian;
-  jacobian << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
-  for (Lamp& lamp : rig.map.lamps) {
-    lamp.sd_m = 0.01;
-    dispersion.uncertain_lamps.push_back({lamp.id, lamp.position_m, 0.01, jacobian});
-    jacobian *= -0.6;
-  }
-  expect_propagated(1e-4 * Eigen::MatrixXd::Identity(6, 6));
+  rig.calibration.dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
+  Eigen::Matrix<double, 2, 6> jacobian;
+  jacobian.leftCols<3>() << 0.5, -0.1, 0.2, 0.1, 0.6, -0.3;
+  jacobian.rightCols<3>() = -0.6 * jacobian.leftCols<3>();
+  const Eigen::MatrixXd covariance = 1e-4 * Eigen::MatrixXd::Identity(6, 6);
+  set_lamp_covariance(covariance);
+  append_parameters(*rig.calibration.covariance, list_pair_names(kOffsetParameter), jacobian,
+                    Matrix2::Zero());
+  expect_propagated(covariance, jacobian);
 }
 
 TEST_F(CameraAboveLamps, FixFailsWithoutKeyOfMap) {

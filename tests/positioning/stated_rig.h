@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
+#include <string_view>
+
+#include "rig/calibration_error.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {
@@ -32,38 +36,42 @@ struct StatedRig : SyntheticRig {
     return scale;
   }
 
-  /// Sets an adjustment.
+  /// Sets an adjustment with errors of lens, zenith, lever arm and lamps.
   void adjust(double size) {
-    Adjustment adjustment{{}, {}, {}, 1, 1, 0.1};
-    for (const Lamp& lamp : map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
     Eigen::VectorXd scale(12 + 4 + 24);
     scale << lens_scale(size), Eigen::VectorXd::Constant(4, 1e-4 * size),
         Eigen::VectorXd::Constant(24, 1e-3 * size);
     Random random(7);
-    adjustment.covariance = mixed(scale, random);
-    calibration.adjustment = adjustment;
+    set_adjusted(mixed(scale, random));
   }
 
-  /// Sets the covariances of sequential steps, with derivatives by earlier steps, and a survey.
-  void calibrate_in_a_row() {
+  /// Sets an adjustment with this joint covariance.
+  void set_adjusted(const MatrixX& covariance) {
+    std::vector<JointCovariance::LampPosition> lamps;
+    for (const Lamp& lamp : map.lamps) lamps.push_back({lamp.id, lamp.position_m});
+    calibration.adjustment = Adjustment{{}, 1, 1, 0.1};
+    calibration.covariance = make_adjusted_covariance(calibration.camera, lamps, covariance);
+  }
+
+  /// Sets the covariances of sequential steps, which depend on earlier ones, and a survey; `errors`
+  /// states which of lens, zenith, offset and lamps have errors of their own.
+  void calibrate_in_a_row(std::array<double, 4> errors = {1, 1, 1, 1}) {
     Random random(8);
     IntrinsicsReport& report = calibration.intrinsics_report.emplace();
-    report.covariance = mixed(lens_scale(1), random);
-    RotationCenter& center = *calibration.rotation_center;
-    const auto jacobian_wrt_intrinsics = [&] {
-      MatrixX effect(2, 12);
+    report.covariance = errors[0] * mixed(lens_scale(1), random);
+    JointCovariance joint = make_lens_covariance(calibration);
+    const auto append = [&](std::string_view name, double size_px, double sd_px) {
+      MatrixX effect(2, joint.matrix.rows());
       for (double& one : effect.reshaped()) one = random.normal();
       effect.leftCols<4>() *= 1e-3;
-      return effect;
+      const Eigen::Vector2d scale = sd_px * calibration.camera.focal_px().cwiseInverse();
+      append_parameters(joint, list_pair_names(name), effect, size_px * mixed(scale, random));
     };
-    center.covariance = mixed(Eigen::Vector2d(0.05, 0.05), random);
-    center.jacobian_wrt_intrinsics = jacobian_wrt_intrinsics();
-    Dispersion& dispersion = calibration.dispersion.emplace();
-    dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
-    dispersion.covariance = mixed(Eigen::Vector2d(0.03, 0.03), random);
-    dispersion.jacobian_wrt_intrinsics = jacobian_wrt_intrinsics();
-    dispersion.jacobian_wrt_zenith = -0.9 * Eigen::Matrix2d::Identity();
-    for (Lamp& lamp : map.lamps) lamp.sd_m = 0.0005;
+    append(kZenithParameter, errors[1], 0.05);
+    append(kOffsetParameter, errors[2], 0.03);
+    calibration.covariance = joint;
+    calibration.dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
+    for (Lamp& lamp : map.lamps) lamp.sd_m = 0.0005 * errors[3];
   }
 };
 

@@ -42,12 +42,11 @@ struct StatedRoom {
   Calibration calibration{
       {"", {800, 600}, LensModel::pinhole, {500, 500, 399.5, 299.5}, {}, {}, {}},
       {},
-      RotationCenter{RotationModel::tilt,
-                     {404.5, 299.5},
-                     Eigen::Vector3d(0.01, 0, 1).normalized(),
-                     Matrix2(1e-2 * Matrix2::Identity())},
+      RotationCenter{RotationModel::tilt, {404.5, 299.5}, Eigen::Vector3d(0.01, 0, 1).normalized()},
       {},
-      {}};
+      {},
+      {},
+      JointCovariance{{}, {"zenith_x", "zenith_y"}, 4e-8 * Matrix2::Identity()}};
 
   StatedRoom() {
     int id = 0;
@@ -104,7 +103,7 @@ TEST(MakeFixErrorBudgetPlot, ReturnsNulloptWithoutMapNoiseSdsOrKnownCommonErrors
   for (FixRow& row : fixes) row.fix->noise_sd.reset();
   EXPECT_FALSE(make_fix_error_budget_plot(fixes, room.lamps, room.calibration));
   for (Lamp& lamp : room.lamps.lamps) lamp.sd_m.reset();
-  room.calibration.rotation_center->covariance.reset();
+  room.calibration.covariance.reset();
   EXPECT_FALSE(make_fix_error_budget_plot(room.fixes(), room.lamps, room.calibration));
 }
 

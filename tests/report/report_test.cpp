@@ -87,8 +87,15 @@ TEST(RenderReportHtml, ShowsValuesOfEachCalibrationPartAndHistory) {
   calibration.camera = {
       "cam-9", {800, 600}, LensModel::opencv4, {500, 501, 400, 300, 0.125, 0, 0, 0}, {}, 3e-5, {}};
   calibration.intrinsics_report = IntrinsicsReport{36, 3416, 28, 0.0459, {}, 0.158, {}};
-  calibration.rotation_center = RotationCenter{
-      RotationModel::tilt, {404, 301}, {std::sin(0.01), 0, std::cos(0.01)}, Matrix2::Identity()};
+  calibration.rotation_center =
+      RotationCenter{RotationModel::tilt, {404, 301}, {std::sin(0.01), 0, std::cos(0.01)}};
+  calibration.covariance = {{},
+                            {"zenith_x", "zenith_y"},
+                            Eigen::Vector2d(1, 1)
+                                .cwiseQuotient(calibration.camera.focal_px())
+                                .cwiseAbs2()
+                                .asDiagonal()
+                                .toDenseMatrix()};
   calibration.dispersion = Dispersion{{0.01, 0.02}, 0.003, {0.001, 0}, 40};
   calibration.history = {
       {"camera", "vlp-intrinsics", "9.9", "--board b.yaml", {{"b.yaml", "abc"}}}};

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "rig/calibration_error.h"
 #include "rig/samples.h"
 
 namespace vlp {
@@ -24,6 +25,7 @@ TEST(MakeCameraOnlyCalibration, ContainsOnlyCameraIntrinsicsReportAndHistoryEntr
   Calibration expected = sample;
   expected.rotation_center.reset();
   expected.dispersion.reset();
+  expected.covariance.reset();
   expected.history = {{"camera", "vlp-intrinsics", "1.2.3", "", {}}};
   expect_same(make_camera_only_calibration(sample.camera, sample.intrinsics_report,
                                            entry_of("vlp-intrinsics")),
@@ -39,7 +41,8 @@ TEST(AddRotationCenterToCalibration, AddsRotationCenterAndHistoryEntryToCameraAl
   Calibration expected = before;
   expected.rotation_center = center;
   expected.history.push_back({"rotation_center", "vlp-rotation", "1.2.3", "", {}});
-  expect_same(add_rotation_center_to_calibration(before, center, entry_of("vlp-rotation")),
+  expect_same(add_rotation_center_to_calibration(before, center, before.covariance,
+                                                 entry_of("vlp-rotation")),
               expected);
 }
 
@@ -49,27 +52,46 @@ TEST(AddRotationCenterToCalibration, ReplacesRotationCenterAndRemovesDispersion)
   Calibration expected = whole_calibration();
   expected.rotation_center = center;
   expected.dispersion.reset();
+  expected.covariance.reset();
   expected.history.resize(1);
   expected.history.push_back({"rotation_center", "vlp-rotation", "1.2.3", "", {}});
-  expect_same(
-      add_rotation_center_to_calibration(whole_calibration(), center, entry_of("vlp-rotation")),
-      expected);
+  expect_same(add_rotation_center_to_calibration(whole_calibration(), center, std::nullopt,
+                                                 entry_of("vlp-rotation")),
+              expected);
 }
 
 TEST(AddDispersionToCalibration, ReplacesDispersionAndKeepsOtherParts) {
-  const Dispersion dispersion{{3, 4}, 0.5, {6, 7}, 8, {}};
+  const Dispersion dispersion{{3, 4}, 0.5, {6, 7}, 8};
   Calibration expected = whole_calibration();
   expected.dispersion = dispersion;
+  expected.covariance = {{}, {"zenith_x", "zenith_y"}, Matrix2::Identity()};
   expected.history[2] = {"dispersion", "vlp-dispersion", "1.2.3", "", {}};
-  expect_same(
-      add_dispersion_to_calibration(whole_calibration(), dispersion, entry_of("vlp-dispersion")),
-      expected);
+  expect_same(add_dispersion_to_calibration(whole_calibration(), dispersion, expected.covariance,
+                                            entry_of("vlp-dispersion")),
+              expected);
+}
+
+TEST(RemoveDispersionFromCalibration, RemovesRowsOfOffsetAndOfItsLampsButKeepsAdjustedLamps) {
+  Calibration calibration = whole_calibration();
+  JointCovariance& joint = *calibration.covariance;
+  const JointCovariance without_offset = joint;
+  append_parameters(joint, list_pair_names(kOffsetParameter), Eigen::MatrixXd::Ones(2, 5),
+                    Eigen::MatrixXd::Identity(2, 2));
+  Calibration expected = whole_calibration();
+  expected.dispersion.reset();
+  expected.history.pop_back();
+  expected.covariance = {{}, {"zenith_x", "zenith_y"}, without_offset.matrix.topLeftCorner<2, 2>()};
+  expect_same(remove_dispersion_from_calibration(calibration), expected);
+  calibration.adjustment = expected.adjustment = Adjustment{{"rotation"}, 12, 70, 0.05};
+  expected.covariance = without_offset;
+  expect_same(remove_dispersion_from_calibration(calibration), expected);
 }
 
 TEST(AddRotationCenterToCalibration, ResultIsUnchangedByWritingAndReading) {
   const TemporaryFolder folder;
-  const Calibration given = add_rotation_center_to_calibration(
-      whole_calibration(), *sample_calibration().rotation_center, entry_of("vlp-rotation"));
+  const Calibration given =
+      add_rotation_center_to_calibration(whole_calibration(), *sample_calibration().rotation_center,
+                                         sample_calibration().covariance, entry_of("vlp-rotation"));
   write_calibration(folder / "calibration.yaml", given);
   expect_same(read_calibration(folder / "calibration.yaml"), given);
 }

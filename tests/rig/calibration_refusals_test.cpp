@@ -79,8 +79,6 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidIntrinsicsReport) {
 }
 
 TEST(ReadCalibration, ReportsLineAndKeyOfInvalidRotationCenter) {
-  const std::string covariance = "rotation_center.covariance: is not a covariance: it should be ";
-  const std::string matrix = "[[0.04, 0.01], [0.01, 0.09]]";
   expect_refused(
       {{"model: tilt", "model: turn",
         "rotation_center.model: 'turn' is unknown; the models are: shift, tilt"},
@@ -90,17 +88,7 @@ TEST(ReadCalibration, ReportsLineAndKeyOfInvalidRotationCenter) {
        {"[0.6, 0, 0.8]", "[0.6, 0, -0.8]", "rotation_center.zenith_in_camera: should be a unit"},
        {"[0.6, 0, 0.8]", "[1, 0, 0]", "rotation_center.zenith_in_camera: should be a unit vector"},
        {"[0.6, 0, 0.8]", "[0, 0, 0]", "rotation_center.zenith_in_camera: should be a unit vector"},
-       {matrix, "[[0.04, 0.01]]", "rotation_center.covariance: should be two rows of two numbers"},
-       {matrix, "[[1, 0], [0]]", "rotation_center.covariance[1]: should be 2 numbers, not 1"},
-       {matrix, "[[0.04, 0.01], [0.02, 0.09]]", covariance + "symmetric and not negative"},
-       {matrix, "[[0.04, 0.1], [0.1, 0.09]]", covariance + "symmetric and not negative"},
-       {matrix, "[[-0.04, 0], [0, -0.09]]", covariance + "symmetric and not negative"},
-       {matrix, "[[0, 0], [0, -0.09]]", covariance + "symmetric and not negative"},
        {"[0.012, -0.009]", "[0.012]", "rotation_center.lever_arm_m: should be 2 numbers, not 1"},
-       {"[[0.0004, 0], [0, 0.0025]]", "[[0.0004, 0], [0, -1]]",
-        "rotation_center.lever_arm_covariance: is not a covariance"},
-       {"  lever_arm_m: [0.012, -0.009]\n", "",
-        "rotation_center.lever_arm_covariance: is of no lever_arm_m"},
        {"center_px:", "middle_px:",
         "rotation_center: key 'center_px' is missing; the keys are: model, middle_px, "
         "zenith_in_camera",

@@ -10,6 +10,7 @@
 #include <limits>
 #include <random>
 
+#include "rig/calibration_error.h"
 #include "rig/calibration_text.h"
 #include "rig/samples.h"
 
@@ -49,40 +50,74 @@ TEST(ReadCalibration, AcceptsPartsInAnyOrder) {
   expect_same(read_calibration(folder.file("calibration.yaml", reordered)), sample_calibration());
 }
 
-TEST(WriteCalibration, RoundTripsCovariancesDerivativesAndAdjustment) {
+/// Returns the sample with a joint covariance of all kinds of parameters.
+Calibration calibration_with_joint_covariance() {
   Calibration calibration = sample_calibration();
-  const Eigen::MatrixXd root = Eigen::MatrixXd::Random(12 + 6, 12 + 6);
-  Eigen::MatrixXd covariance = 0.01 * root * root.transpose();
-  covariance = 0.5 * (covariance + covariance.transpose()).eval();  // to the last bit
-  calibration.intrinsics_report->covariance = covariance.topLeftCorner(8, 8);
-  calibration.rotation_center->jacobian_wrt_intrinsics = root.topLeftCorner(2, 8);
-  calibration.dispersion->jacobian_wrt_zenith = Matrix2{{-1, 0.1}, {0, -1}};
-  calibration.dispersion->uncertain_lamps = {{3, {1, 2, 3}, 0.002, root.topLeftCorner(2, 3)},
-                                             {7, {-1, 0, 3}, 0.001, root.topRightCorner(2, 3)}};
-  calibration.adjustment = Adjustment{
-      {{3, {1, 2, 3}}, {7, {-1, 0, 3}}}, covariance, {"rotation", "survey"}, 12, 70, 0.05};
-  expect_kept(calibration);
+  calibration.history.clear();
+  const Eigen::MatrixXd root = Eigen::MatrixXd::Random(8, 8);
+  calibration.intrinsics_report->covariance =
+      0.01 * root * root.transpose() + 0.1 * Eigen::MatrixXd::Identity(8, 8);
+  JointCovariance joint = make_lens_covariance(calibration);
+  calibration.intrinsics_report->covariance = joint.matrix;
+  const auto append = [&](std::span<const std::string> names) {
+    const auto size = std::ssize(names);
+    append_parameters(joint, names, Eigen::MatrixXd::Random(size, joint.matrix.rows()),
+                      0.01 * Eigen::MatrixXd::Identity(size, size));
+  };
+  append(list_pair_names(kZenithParameter));
+  append(list_pair_names(kLeverArmParameter));
+  joint.lamps = {{3, {1, 2, 3}}, {7, {-1, 0, 3}}};
+  for (const auto& lamp : joint.lamps) append(list_lamp_parameter_names(lamp.id));
+  append(list_pair_names(kOffsetParameter));
+  calibration.covariance = joint;
+  calibration.adjustment = Adjustment{{"rotation", "survey"}, 12, 70, 0.05};
+  return calibration;
 }
 
-TEST(ReadCalibration, RejectsAdjustmentWithMissingStateRowOrInvalidCorrelation) {
+TEST(WriteCalibration, RoundTripsJointCovarianceAndAdjustment) {
+  expect_kept(calibration_with_joint_covariance());
+}
+
+TEST(ReadCalibration, RejectsJointCovarianceWithMissingOrUnknownRowOrInvalidCorrelation) {
   const TemporaryFolder folder;
-  Calibration calibration = sample_calibration();
-  calibration.adjustment =
-      Adjustment{{{3, {1, 2, 3}}}, Eigen::MatrixXd::Identity(15, 15), {"rotation"}, 12, 70, 0.05};
-  write_calibration(folder / "good.yaml", calibration);
-  const std::string good = folder.read_content(folder / "good.yaml");
-  const auto refusal = [&](const std::string& from, const std::string& to) {
-    const auto file = folder.file("bad.yaml", changed(good, from, to));
-    try {
-      read_calibration(file);
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string();
+  write_calibration(folder / "good.yaml", calibration_with_joint_covariance());
+  const std::string joint = folder.read_content(folder / "good.yaml");
+  const auto refusal_of = [&](const std::string& good, const std::string& from,
+                              const std::string& to) {
+    return refusal(read_calibration, folder.file("bad.yaml", changed(good, from, to)));
   };
-  EXPECT_THAT(refusal("zenith_x", "zenith_y"), testing::HasSubstr("zenith_x is missing"));
-  EXPECT_THAT(refusal("    - [0, 1]", "    - [2, 1]"), testing::HasSubstr("correlation"));
-  EXPECT_THAT(refusal("    - [1]\n", ""), testing::HasSubstr("15 rows of 1, 2, 3"));
+  EXPECT_THAT(refusal_of(joint, "zenith_x, ", ""), testing::HasSubstr("lamp_3_x_m is missing"));
+  EXPECT_THAT(refusal_of(joint, "zenith_y, ", ""), testing::HasSubstr("zenith_y is missing"));
+  EXPECT_THAT(refusal_of(joint, "lamp_7_z_m, ", ""), testing::HasSubstr("lamp_7_z_m is missing"));
+  EXPECT_THAT(refusal_of(joint, "offset_y", "offset_y, offset_z"),
+              testing::HasSubstr("joint_covariance.parameters[20]: is not in its place"));
+  EXPECT_THAT(refusal_of(joint, "id: 7", "id: 8"), testing::HasSubstr("lamp_8_x_m is missing"));
+  EXPECT_THAT(refusal_of(joint, "parameters: [fx", "parameters: [fz"),
+              testing::HasSubstr("lamp_3_x_m is missing"));
+  EXPECT_THAT(refusal_of(kCalibrationYaml, "    - [0.04]\n", ""),
+              testing::HasSubstr("should be 5 rows of 1, 2 ... numbers, the lower triangle"));
+  EXPECT_THAT(refusal_of(kCalibrationYaml, "[0.01, 0.09]", "[0.1, 0.09]"),
+              testing::HasSubstr("joint_covariance.rows[1]: is not a covariance's"));
+  EXPECT_THAT(refusal_of(kCalibrationYaml, "[0.04]", "[-0.04]"),
+              testing::HasSubstr("joint_covariance.rows[0]: is not a covariance's"));
+  EXPECT_THAT(refusal_of(kCalibrationYaml, "0, 0.25]", "0, 2.5e12]"),
+              testing::HasSubstr("a standard deviation beyond 1,000,000"));
+  EXPECT_THAT(
+      refusal_of(kCalibrationYaml, "[zenith_x", "[fx, fy, cx, cy, k1, k2, p1, p2, zenith_x"),
+      testing::HasSubstr("intrinsics_report has no covariance"));
+}
+
+TEST(ReadCalibration, RejectsPartWithOwnCovarianceAndNamesProgramThatReplacesIt) {
+  const TemporaryFolder folder;
+  const auto refusal_with = [&](const std::string& line) {
+    return refusal(read_calibration,
+                   folder.file("old.yaml", changed(kCalibrationYaml, line,
+                                                   line + "  covariance: [[1, 0], [0, 1]]\n")));
+  };
+  EXPECT_THAT(refusal_with("  center_px: [801.25, 597.5]\n"),
+              testing::HasSubstr("rotation_center: key 'covariance' is now in joint_covariance: "
+                                 "run vlp-rotation again on the calibration from before it"));
+  EXPECT_THAT(refusal_with("  radius_m: 0.0031\n"), testing::HasSubstr("run vlp-dispersion again"));
 }
 
 TEST(WriteCalibration, OmitsInfiniteExpectedMaxError) {
@@ -101,13 +136,8 @@ TEST(WriteCalibration, RoundTripsCalibrationWithoutEachOptionalPart) {
       [](Calibration& c) { c.camera.readout.reset(); },
       [](Calibration& c) { c.intrinsics_report->board_warp_m.reset(); },
       [](Calibration& c) { c.intrinsics_report->expected_max_error_px.reset(); },
-      [](Calibration& c) { c.rotation_center->covariance.reset(); },
-      [](Calibration& c) { c.rotation_center->lever_arm_covariance.reset(); },
-      [](Calibration& c) {
-        c.rotation_center->lever_arm_covariance.reset();
-        c.rotation_center->lever_arm_m.reset();
-      },
-      [](Calibration& c) { c.dispersion->covariance.reset(); },
+      [](Calibration& c) { c.covariance.reset(); },
+      [](Calibration& c) { c.rotation_center->lever_arm_m.reset(); },
       [](Calibration& c) { c.intrinsics_report.reset(); },
       [](Calibration& c) { c.rotation_center.reset(); },
       [](Calibration& c) { c.history.clear(); },
@@ -150,15 +180,17 @@ TEST(WriteCalibration, RoundTripsParametersOfEachLensModel) {
   }
 }
 
-TEST(WriteCalibration, RoundTripsCovarianceAndJacobiansOfSplinedLensCore) {
+TEST(WriteCalibration, RoundTripsCovarianceOfSplinedLensCore) {
   Calibration calibration = sample_calibration();
   calibration.camera.lens_model = lens_model_for_spline_grid({2, 3, 3, 120});
   calibration.camera.intrinsics.resize(num_lens_parameters(calibration.camera.lens_model), 0.25);
   const Eigen::MatrixXd root = Eigen::MatrixXd::Random(4, 4);
   const Eigen::MatrixXd covariance = 0.01 * root * root.transpose();
   calibration.intrinsics_report->covariance = 0.5 * (covariance + covariance.transpose()).eval();
-  calibration.rotation_center->jacobian_wrt_intrinsics = root.topRows(2);
-  calibration.dispersion->jacobian_wrt_intrinsics = root.bottomRows(2);
+  JointCovariance joint = make_lens_covariance(calibration);
+  append_parameters(joint, list_pair_names(kZenithParameter), root.topRows(2),
+                    Eigen::MatrixXd::Identity(2, 2));
+  calibration.covariance = joint;
   expect_kept(calibration);
 }
 
@@ -193,8 +225,7 @@ TEST(WriteCalibration, RoundTripsRandomNumbersExactly) {
     calibration.dispersion = {{random_number(), random_number()},
                               std::abs(random_number()),
                               {random_number(), random_number()},
-                              1,
-                              {}};
+                              1};
     expect_kept(calibration);
   }
 }
@@ -207,7 +238,7 @@ TEST(WriteCalibration, RoundTripsUnitVectorsAndFullyCorrelatedCovariances) {
     Eigen::Vector3d up(normal(random), normal(random), std::abs(normal(random)));
     calibration.rotation_center->zenith_in_camera = up.normalized();
     const Eigen::Vector2d sd(normal(random), normal(random));
-    calibration.rotation_center->covariance = sd * sd.transpose();
+    calibration.covariance = {{}, {"zenith_x", "zenith_y"}, sd * sd.transpose()};
     expect_kept(calibration);
   }
 }

@@ -49,15 +49,22 @@ rotation_center:
   model: tilt
   center_px: [801.25, 597.5]
   zenith_in_camera: [0.6, 0, 0.8]
-  covariance: [[0.04, 0.01], [0.01, 0.09]]
   lever_arm_m: [0.012, -0.009]
-  lever_arm_covariance: [[0.0004, 0], [0, 0.0025]]
 dispersion:
   offset_px: [1.5, -0.75]
   radius_m: 0.0031
   center_m: [0.002, -0.001]
   captures: 12
-  covariance: [[0.25, 0], [0, 0.0625]]
+joint_covariance:
+  lamps:
+    - {id: 7, position_m: [-0.25, 0, 2.1]}
+  parameters: [zenith_x, zenith_y, lamp_7_x_m, lamp_7_y_m, lamp_7_z_m]
+  rows:
+    - [0.04]
+    - [0.01, 0.09]
+    - [0, 0, 0.0004]
+    - [0, 0.01, 0, 0.0025]
+    - [0, 0, 0, 0, 0.25]
 camera:
   id: "007"
   pixel_pitch_m: 3.45e-06
@@ -99,12 +106,15 @@ Calibration sample_calibration() {
                                    0.08,
                                    {},
                                    {{10, 20}, {1500, 20.5}, {700, 1100}}};
-  const Matrix2 covariance{{0.04, 0.01}, {0.01, 0.09}};
-  const Matrix2 lever_arm_covariance{{4e-4, 0}, {0, 25e-4}};
-  calibration.rotation_center = {RotationModel::tilt, {801.25, 597.5},   {0.6, 0, 0.8},
-                                 covariance,          {{0.012, -0.009}}, lever_arm_covariance};
-  calibration.dispersion = {
-      {1.5, -0.75}, 0.0031, {0.002, -0.001}, 12, Matrix2{{0.25, 0}, {0, 0.0625}}};
+  calibration.rotation_center = {
+      RotationModel::tilt, {801.25, 597.5}, {0.6, 0, 0.8}, {{0.012, -0.009}}};
+  calibration.dispersion = {{1.5, -0.75}, 0.0031, {0.002, -0.001}, 12};
+  Eigen::MatrixXd matrix =
+      Eigen::Vector<double, 5>(0.04, 0.09, 4e-4, 25e-4, 0.25).asDiagonal().toDenseMatrix();
+  matrix(0, 1) = matrix(1, 0) = matrix(1, 3) = matrix(3, 1) = 0.01;
+  calibration.covariance = {{{7, {-0.25, 0, 2.1}}},
+                            {"zenith_x", "zenith_y", "lamp_7_x_m", "lamp_7_y_m", "lamp_7_z_m"},
+                            matrix};
   calibration.history = {{"camera",
                           "vlp-intrinsics",
                           "0.1.0",

@@ -160,19 +160,24 @@ TEST_F(RunJointAdjustmentStep, StoresSetsLampsAndCovarianceOfSelectedMap) {
   const Adjustment& kept = *surveyed.calibration.adjustment;
   EXPECT_THAT(kept.sets, testing::ElementsAre("set 0", "set 1"));
   EXPECT_EQ(kept.captures, 23);
-  EXPECT_EQ(kept.covariance, surveyed.adjustment.surveyed_covariance);
-  ASSERT_EQ(kept.lamps.size(), input.lamps.lamps.size());
-  EXPECT_EQ(kept.lamps[3].id, 4);
-  EXPECT_EQ(kept.lamps[3].position_m, input.lamps.lamps[3].position_m);
+  ASSERT_TRUE(surveyed.calibration.covariance);
+  const JointCovariance& joint = *surveyed.calibration.covariance;
+  const Eigen::Index rows = joint.matrix.rows();
+  EXPECT_EQ(joint.matrix, surveyed.adjustment.surveyed_covariance.bottomRightCorner(rows, rows));
+  ASSERT_EQ(joint.lamps.size(), input.lamps.lamps.size());
+  EXPECT_EQ(joint.lamps[3].id, 4);
+  EXPECT_EQ(joint.lamps[3].position_m, input.lamps.lamps[3].position_m);
   ASSERT_FALSE(surveyed.calibration.history.empty());
   EXPECT_EQ(surveyed.calibration.history.back().part, "adjustment");
   input.lamps.lamps[3].position_m.x() += 0.003;
   input.refine_map = true;
   const AdjustStepResult refined = run_joint_adjustment_step(input, {});
   ASSERT_TRUE(refined.has_succeeded() && refined.calibration.adjustment) << refined.message;
-  EXPECT_EQ(refined.calibration.adjustment->covariance, refined.adjustment.refined_covariance);
-  ASSERT_GT(refined.calibration.adjustment->lamps.size(), 3U);
-  EXPECT_EQ(refined.calibration.adjustment->lamps[3].position_m,
+  ASSERT_TRUE(refined.calibration.covariance);
+  EXPECT_EQ(refined.calibration.covariance->matrix,
+            refined.adjustment.refined_covariance.bottomRightCorner(rows, rows));
+  ASSERT_GT(refined.calibration.covariance->lamps.size(), 3U);
+  EXPECT_EQ(refined.calibration.covariance->lamps[3].position_m,
             refined.adjustment.refined_map.lamps[3].position_m);
   EXPECT_THAT(rejection_message([&] {
                 input.calibration = surveyed.calibration;

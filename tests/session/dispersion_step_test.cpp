@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "rig/calibration_error.h"
+#include "support/matchers.h"
 #include "support/body_rig.h"
 #include "support/synthetic_rig.h"
 
@@ -179,7 +181,6 @@ TEST(RunDispersionCalibrationStep, FailureNamesStatusOfFirstFix) {
 TEST(RunDispersionCalibrationStep, HasNoCovarianceForEnclosingCircleOfPositionsOfAxis) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0, 0);
-  rig.calibration.rotation_center->lever_arm_covariance = 1e-8 * Matrix2::Identity();
   KnownPositions known = take_captures_at_origin(rig, {0.1, 0});
   const ReferencePointCapture first = known.captures.front();
   known.captures.assign(3, first);  // at one yaw, as the circle requires
@@ -190,39 +191,41 @@ TEST(RunDispersionCalibrationStep, HasNoCovarianceForEnclosingCircleOfPositionsO
         run_dispersion_calibration_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
                                         DispersionMethod::chen_guan, circle, {});
     ASSERT_TRUE(result.has_succeeded()) << result.message;
-    EXPECT_EQ(result.fit.dispersion.covariance.has_value(), has_covariance);
+    EXPECT_EQ(result.calibration.covariance.has_value(), has_covariance);
   }
 }
 
-TEST(RunDispersionCalibrationStep, AddsLeverArmCovarianceToOffsetForPositionsOfAxis) {
-  SyntheticRig rig = make_rig_with_tilted_camera();
-  rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0, 0);
-  KnownPositions known = take_captures_at_origin(rig, {0, 0});
-  known.measured_points.assign(8, MeasuredPoint::axis);
-  const auto find_covariance = [&] {
-    const DispersionResult result = run_step(rig, known);
-    EXPECT_TRUE(result.has_succeeded()) << result.message;
-    return result.fit.dispersion.covariance.value_or(Matrix2::Zero());
-  };
-  const Matrix2 without = find_covariance();
-  constexpr double x_sd_m = 1e-3, y_sd_m = 2e-3;
-  rig.calibration.rotation_center->lever_arm_covariance =
-      Eigen::Vector2d(x_sd_m * x_sd_m, y_sd_m * y_sd_m).asDiagonal().toDenseMatrix();
-  const Matrix2 added = find_covariance() - without;
-  // A lever arm a acts as an offset of f a / H below lamps at the height H.
-  const Eigen::Vector2d focal_px = rig.calibration.camera.focal_px();
-  const double height_m = rig.map.lamps.front().position_m.z();
-  EXPECT_NEAR(std::sqrt(added(0, 0)), focal_px.x() * x_sd_m / height_m, 1e-3);
-  EXPECT_NEAR(std::sqrt(added(1, 1)), focal_px.y() * y_sd_m / height_m, 1e-3);
-  EXPECT_NEAR(added(0, 1), 0, 1e-6);
-  // The part that follows the zenith is not counted twice: zenith_sd_px at the slope of 1.5 m.
-  constexpr double zenith_sd_px = 0.2, slope_m = 1.5;
-  rig.calibration.rotation_center->covariance = zenith_sd_px * zenith_sd_px * Matrix2::Identity();
-  rig.calibration.rotation_center->lever_arm_jacobian_wrt_zenith = slope_m * Matrix2::Identity();
-  const double removed_m = slope_m * zenith_sd_px / focal_px.x();
-  EXPECT_NEAR((find_covariance() - without)(0, 0),
-              std::pow(focal_px.x() / height_m, 2) * (x_sd_m * x_sd_m - removed_m * removed_m),
-              2e-3);
+TEST(RunDispersionCalibrationStep, OffsetHasErrorsOfLeverArmForPositionsOfAxisOnly) {
+  for (const MeasuredPoint point : {MeasuredPoint::camera, MeasuredPoint::axis}) {
+    SyntheticRig rig = make_rig_with_tilted_camera();
+    KnownPositions known = take_captures_at_origin(rig, {0, 0});
+    known.measured_points.assign(8, point);
+    const auto run_with_arm = [&](const Eigen::Vector2d& lever_arm_m) {
+      rig.calibration.rotation_center->lever_arm_m = lever_arm_m;
+      DispersionResult result = run_step(rig, known);
+      EXPECT_TRUE(result.has_succeeded()) << result.message;
+      return result;
+    };
+    const auto find_covariance = [&] {
+      const auto covariance =
+          compute_dispersion_offset_covariance(run_with_arm({0, 0}).calibration);
+      EXPECT_TRUE(covariance);
+      return covariance.value_or(Matrix2::Zero());
+    };
+    const Matrix2 without = find_covariance();
+    const Eigen::Vector2d arm_sd_m(1e-3, 2e-3);
+    append_parameters(rig.calibration.covariance.emplace(), list_pair_names(kLeverArmParameter),
+                      MatrixX(2, 0), arm_sd_m.cwiseAbs2().asDiagonal().toDenseMatrix());
+    const Matrix2 added = find_covariance() - without;
+    Eigen::Matrix2d changes_px;
+    for (Eigen::Index axis = 0; axis < 2; ++axis) {
+      const Eigen::Vector2d arm_m = arm_sd_m[axis] * Eigen::Vector2d::Unit(axis);
+      changes_px.col(axis) = run_with_arm(arm_m).fit.dispersion.offset_px -
+                             run_with_arm({0, 0}).fit.dispersion.offset_px;
+    }
+    EXPECT_EQ(changes_px.norm() > 0.1, point == MeasuredPoint::axis);
+    EXPECT_THAT(added, IsNear(Matrix2(changes_px * changes_px.transpose()), 1e-3));
+  }
 }
 
 TEST(RunDispersionCalibrationStep, DoesNotReportMovedLampForSingleYaw) {

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rig/calibration_error.h"
 #include "session/locate_step.h"
 #include "support/body_rig.h"
 
@@ -94,17 +95,17 @@ TEST(LocateCameraFromDetections, WarnsOfImagesThatTableLacks) {
 
 TEST(LocateCameraFromDetections, WarnsOfLampsMovedSinceAdjustment) {
   Captures captures(6);
-  Adjustment adjustment{{}, MatrixX::Zero(12 + 4 + 24, 12 + 4 + 24), {"made up"}, 1, 1, 0.1};
-  for (const Lamp& lamp : captures.input.lamps.lamps) {
-    adjustment.lamps.push_back({lamp.id, lamp.position_m});
-  }
+  std::vector<JointCovariance::LampPosition> lamps;
+  for (const Lamp& lamp : captures.input.lamps.lamps) lamps.push_back({lamp.id, lamp.position_m});
   captures.input.calibration.rotation_center = tilted_by(captures.input.calibration.camera, 0, 0);
-  captures.input.calibration.adjustment = adjustment;
+  captures.input.calibration.adjustment = Adjustment{{"made up"}, 1, 1, 0.1};
+  captures.input.calibration.covariance = make_adjusted_covariance(
+      captures.input.calibration.camera, lamps, MatrixX::Zero(12 + 4 + 24, 12 + 4 + 24));
   const auto count_warnings = [&] {
     return locate_camera_from_detections(captures.input).warnings.size();
   };
   EXPECT_EQ(count_warnings(), 0U);
-  captures.input.calibration.adjustment->lamps[2].position_m.x() += 0.1;
+  captures.input.calibration.covariance->lamps[2].position_m.x() += 0.1;
   EXPECT_EQ(count_warnings(), 1U);
 }
 

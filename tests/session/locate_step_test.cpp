@@ -8,6 +8,7 @@
 #include <array>
 #include <utility>
 
+#include "rig/calibration_error.h"
 #include "support/body_rig.h"
 #include "support/datasets.h"
 
@@ -145,10 +146,13 @@ LocateInput room_with_a_moved_lamp(double by_m) {
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
   LocateInput input{{}, rig.map, rig.calibration};
-  Adjustment adjustment{{}, MatrixX::Zero(12 + 4 + 24, 12 + 4 + 24), {"made up"}, 1, 1, 0.1};
-  for (const Lamp& lamp : rig.map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
-  adjustment.covariance.diagonal().tail<24>().setConstant(1e-3 * 1e-3);
-  input.calibration.adjustment = adjustment;
+  MatrixX covariance = MatrixX::Zero(12 + 4 + 24, 12 + 4 + 24);
+  covariance.diagonal().tail<24>().setConstant(1e-3 * 1e-3);
+  std::vector<JointCovariance::LampPosition> lamps;
+  for (const Lamp& lamp : rig.map.lamps) lamps.push_back({lamp.id, lamp.position_m});
+  input.calibration.adjustment = Adjustment{{"made up"}, 1, 1, 0.1};
+  input.calibration.covariance =
+      make_adjusted_covariance(input.calibration.camera, lamps, covariance);
   rig.map.lamps[1].position_m.x() += by_m;
   Random random(5);
   for (int i = 0; i < 36; ++i) {

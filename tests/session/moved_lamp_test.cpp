@@ -137,11 +137,10 @@ TEST_F(MovedLamp, AdjustmentReplacesCovarianceOfLens) {
       {{{"check", check, {}}}, map, kFile, with_report, "camera.yaml", 1e-3, {}}, {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   const auto& report = result.calibration.intrinsics_report;
-  ASSERT_TRUE(report && report->covariance && result.calibration.adjustment);
+  ASSERT_TRUE(report && report->covariance && result.calibration.covariance);
   const Eigen::Index count = report->covariance->rows();
   EXPECT_EQ(count, with_report.intrinsics_report->covariance->rows());
-  EXPECT_EQ(*report->covariance,
-            result.calibration.adjustment->covariance.topLeftCorner(count, count));
+  EXPECT_EQ(*report->covariance, result.calibration.covariance->matrix.topLeftCorner(count, count));
 }
 
 TEST_F(MovedLamp, AdjustmentWarnsOfSetThatIsNoRotationInPlace) {

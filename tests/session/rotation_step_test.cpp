@@ -7,7 +7,10 @@
 #include <numbers>
 
 #include "calibration/adjustment/survey.h"
+#include "rig/calibration_error.h"
 #include "support/body_rig.h"
+#include "support/joint_covariance.h"
+#include "support/matchers.h"
 
 namespace vlp {
 namespace {
@@ -64,9 +67,10 @@ TEST(RunRotationCalibrationStep, MetricsAreTiltLeverArmAndResidualsOfExactCaptur
   EXPECT_NEAR(find_metric_or_minus_one(result, "lever_arm_mm"), std::hypot(9, 4), 1e-5);
   EXPECT_NEAR(find_metric_or_minus_one(result, "rotation_px"), 0, 1e-6);
   const auto& center = result.calibration.rotation_center;
-  ASSERT_TRUE(center && center->covariance);
-  EXPECT_EQ(find_metric_or_minus_one(result, "rotation_sd_px"),
-            std::sqrt(center->covariance->trace()));
+  const auto covariance = compute_rotation_center_covariance(result.calibration);
+  ASSERT_TRUE(center && covariance);
+  EXPECT_NEAR(find_metric_or_minus_one(result, "rotation_sd_px"), std::sqrt(covariance->trace()),
+              1e-12);
   EXPECT_GE(find_metric_or_minus_one(result, "rotation_spread_px"), 0);
   ASSERT_EQ(result.calibration.history.size(), 1U);
   EXPECT_EQ(result.calibration.history[0].part, "rotation_center");
@@ -120,7 +124,7 @@ TEST(RunRotationCalibrationStep, WarnsIfThreeCapturesLeaveNoStandardDeviation) {
     }
     const RotationResult result = camera.calibrate(RotationMethod::circle);
     ASSERT_TRUE(result.has_succeeded()) << result.message;
-    EXPECT_EQ(result.fit.center.covariance.has_value(), count == 4);
+    EXPECT_EQ(result.calibration.covariance.has_value(), count == 4);
     EXPECT_EQ(find_metric_value(result.metrics, "rotation_sd_px").has_value(), count == 4);
     if (count == 4) {
       EXPECT_THAT(result.warnings, Not(Contains(warning)));
@@ -130,24 +134,29 @@ TEST(RunRotationCalibrationStep, WarnsIfThreeCapturesLeaveNoStandardDeviation) {
   }
 }
 
-TEST(RunRotationCalibrationStep, HasLensJacobiansOnlyWithLensCovariance) {
+TEST(RunRotationCalibrationStep, JointCovarianceHasLensOnlyWithLensCovariance) {
   RotatingCamera camera;
   for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
-  EXPECT_FALSE(camera.calibrate().fit.center.jacobian_wrt_intrinsics);
+  const auto list_parameters = [&] {
+    return camera.calibrate().calibration.covariance.value().parameters;
+  };
+  const std::vector<std::string> without_lens{"zenith_x", "zenith_y", "lever_arm_x_m",
+                                              "lever_arm_y_m"};
+  EXPECT_EQ(list_parameters(), without_lens);
   IntrinsicsReport& report = camera.captures.calibration.intrinsics_report.emplace();
-  EXPECT_FALSE(camera.calibrate().fit.center.jacobian_wrt_intrinsics);
+  EXPECT_EQ(list_parameters(), without_lens);
   report.covariance = lens_covariance(camera.captures.calibration.camera, 0.1, 8);
   const RotationResult result = camera.calibrate();
-  const RotationCenter& center = result.fit.center;
-  ASSERT_TRUE(center.jacobian_wrt_intrinsics && center.lever_arm_jacobian_wrt_intrinsics);
-  EXPECT_EQ(center.jacobian_wrt_intrinsics->rows(), 2);
-  EXPECT_EQ(center.jacobian_wrt_intrinsics->cols(), report.covariance->rows());
-  EXPECT_EQ(center.lever_arm_jacobian_wrt_intrinsics->rows(), 2);
   EXPECT_THAT(result.warnings, IsEmpty());
+  ASSERT_TRUE(result.calibration.covariance);
+  const JointCovariance& joint = *result.calibration.covariance;
+  const Eigen::Index count = report.covariance->rows();
+  ASSERT_EQ(joint.matrix.rows(), count + 4);
+  EXPECT_THAT(joint.matrix.topLeftCorner(count, count), IsNear(*report.covariance, 1e-12));
   // A shift of the principal point moves the zenith by about -1 / f.
-  EXPECT_NEAR((*center.jacobian_wrt_intrinsics)(0, 2),
-              -1 / camera.captures.calibration.camera.focal_px().x(), 4e-4);
-  EXPECT_NEAR((*center.jacobian_wrt_intrinsics)(1, 2), 0, 4e-4);
+  const MatrixX jacobian = derivative_by_lens(joint, kZenithParameter, count);
+  EXPECT_NEAR(jacobian(0, 2), -1 / camera.captures.calibration.camera.focal_px().x(), 4e-4);
+  EXPECT_NEAR(jacobian(1, 2), 0, 4e-4);
 }
 
 TEST(RunRotationCalibrationStep, FailsIfCapturesAreNoRotationInPlace) {

@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "geometry/angles.h"
+#include "rig/calibration_error.h"
 #include "support/schema.h"
 #include "support/synthetic_rig.h"
 #include "support/temporary_folder.h"
@@ -103,8 +104,8 @@ TEST(FormatSessionJson, StatesRotationCenterAndDispersionInMillimetersAndDegrees
   constexpr double tilt_rad = 0.02, azimuth_rad = 1;
   calibration.rotation_center = tilted_by(calibration.camera, tilt_rad, azimuth_rad);
   calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0.002, -0.003);
-  calibration.rotation_center->lever_arm_covariance =
-      Eigen::Vector2d(1e-8, 4e-8).asDiagonal().toDenseMatrix();
+  append_parameters(calibration.covariance.emplace(), list_pair_names(kLeverArmParameter),
+                    MatrixX(2, 0), Eigen::Vector2d(1e-8, 4e-8).asDiagonal().toDenseMatrix());
   calibration.dispersion = Dispersion{{0.4, -0.3}, 0.001, {0, 0}, 12};
   const auto json = nlohmann::json::parse(format_session_json(result, {}))["calibration"];
   EXPECT_NEAR(json.at("tilt_deg"), deg_from_rad(tilt_rad), 1e-9);
@@ -150,15 +151,18 @@ TEST(FormatSessionJson, StatesStandardDeviationsOfZenithAndOffset) {
   for (const char* key : {"rotation_center_sd_px", "zenith_sd_deg", "dispersion_offset_sd_px"}) {
     EXPECT_TRUE(format_calibration().at(key).is_null()) << key;
   }
-  // The lens is known, and neither zenith nor offset depend on it.
+  // The lens is known, and exact.
   const auto count = static_cast<Eigen::Index>(calibration.camera.intrinsics.size());
-  calibration.intrinsics_report.emplace().covariance = MatrixX::Identity(count, count);
-  calibration.rotation_center->jacobian_wrt_intrinsics = MatrixX::Zero(2, count);
-  calibration.dispersion->jacobian_wrt_intrinsics = MatrixX::Zero(2, count);
-  calibration.dispersion->jacobian_wrt_zenith = Matrix2::Zero();
-  calibration.rotation_center->covariance =
-      Eigen::Vector2d(0.01, 0.04).asDiagonal().toDenseMatrix();
-  calibration.dispersion->covariance = Eigen::Vector2d(0.0009, 0.0016).asDiagonal().toDenseMatrix();
+  calibration.intrinsics_report.emplace().covariance = MatrixX::Zero(count, count);
+  calibration.covariance = make_lens_covariance(calibration);
+  const auto append = [&](std::string_view name, const Eigen::Vector2d& sd_px) {
+    const Eigen::Vector2d variances = sd_px.cwiseQuotient(focal_px).cwiseAbs2();
+    append_parameters(*calibration.covariance, list_pair_names(name),
+                      MatrixX::Zero(2, calibration.covariance->matrix.rows()),
+                      variances.asDiagonal().toDenseMatrix());
+  };
+  append(kZenithParameter, {0.1, 0.2});
+  append(kOffsetParameter, {0.03, 0.04});
   const auto json = format_calibration();
   EXPECT_NEAR(json.at("rotation_center_sd_px")[0], 0.1, 1e-12);
   EXPECT_NEAR(json.at("rotation_center_sd_px")[1], 0.2, 1e-12);

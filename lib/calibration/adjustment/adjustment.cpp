@@ -645,9 +645,8 @@ void set_detection_residuals(const AssembledProblem& all, const LampMap& lamps, 
   result.noise_is_contradicted = all.noise_is_stated && problem.noise_scale > 1 + chance;
 }
 
-/// Sets lens, zenith and lever arm with their covariances.
-void set_adjusted_rotation_center(const AdjustmentProblem& problem,
-                                  const Eigen::MatrixXd& covariance, bool has_lever_arm,
+/// Sets lens, zenith and lever arm.
+void set_adjusted_rotation_center(const AdjustmentProblem& problem, bool has_lever_arm,
                                   AdjustmentResult& result) {
   const AdjustmentLayout& at = problem.state_vector_layout();
   const Eigen::VectorXd& state = problem.state_vector();
@@ -657,16 +656,7 @@ void set_adjusted_rotation_center(const AdjustmentProblem& problem,
   result.center.model = RotationModel::tilt;
   result.center.zenith_in_camera = zenith.homogeneous().normalized();
   result.center.center_px = result.camera.principal_point_px() + focal_px.cwiseProduct(zenith);
-  Matrix2 center_covariance =
-      focal_px.asDiagonal() * covariance.block<2, 2>(at.zenith, at.zenith) * focal_px.asDiagonal();
-  center_covariance(1, 0) = center_covariance(0, 1);
-  result.center.covariance = center_covariance;
-  if (has_lever_arm) {
-    result.center.lever_arm_m = state.segment<2>(at.lever_arm);
-    Matrix2 arm_covariance = covariance.block<2, 2>(at.lever_arm, at.lever_arm);
-    arm_covariance(1, 0) = arm_covariance(0, 1);
-    result.center.lever_arm_covariance = arm_covariance;
-  }
+  if (has_lever_arm) result.center.lever_arm_m = state.segment<2>(at.lever_arm);
 }
 
 /// Sets the joint covariance of intrinsics (from the directions of the lens), zenith, lever arm and
@@ -860,7 +850,7 @@ AdjustmentResult run_bundle_adjustment(const AdjustmentInput& all_lamps,
   bool has_lever_arm = false;
   result.undetermined = explain_undetermined(problem, covariance, compute_mean_height_m(problem),
                                              limits, has_lever_arm);
-  set_adjusted_rotation_center(problem, covariance, has_lever_arm, result);
+  set_adjusted_rotation_center(problem, has_lever_arm, result);
   set_adjusted_joint_covariance(problem, covariance, has_lever_arm, result);
   set_adjusted_map(all, input.lamps, contradictions, result);
   set_position_residuals(all, result);

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
@@ -137,10 +138,17 @@ struct AdjustmentResult {
   std::vector<LampCorrection> lamps;
   /// Ids of the lamps in the joint covariance, in its order: those with a detection.
   std::vector<int> covariance_lamp_ids;
-  /// Joint covariance (Adjustment::covariance) with these lamps of `refined_map`, and of the
-  /// surveyed map. The latter has the same estimates with the errors of the survey in the positions
-  /// of the lamps.
+  /// Joint covariance of intrinsics, zenith, lever arm and these lamps of `refined_map`, in the
+  /// units of JointCovariance, and of the surveyed map. The latter has the same estimates with the
+  /// errors of the survey in the positions of the lamps. Zero for quantities taken as exact.
   Eigen::MatrixXd refined_covariance, surveyed_covariance;
+  /// Returns the covariance of the zenith's normalized point and, if there is one, the lever arm.
+  MatrixX center_covariance() const {
+    const Eigen::Index lamp_rows = 3 * std::ssize(covariance_lamp_ids),
+                       first = refined_covariance.rows() - lamp_rows - 4,
+                       size = center.lever_arm_m ? 4 : 2;
+    return refined_covariance.block(first, first, size, size);
+  }
 
   /// Known position of the camera or of the axis, with its residual after the adjustment.
   struct PositionResidual {

@@ -6,6 +6,7 @@
 
 #include "calibration/dispersion/offset_separation.h"
 #include "calibration/dispersion/reference_point_fixes.h"
+#include "rig/calibration_error.h"
 
 namespace vlp {
 
@@ -39,17 +40,13 @@ bool all_have_sigma(std::span<const ReferencePointCapture> captures) {
   });
 }
 
-/// Converts derivatives of offset_px, the first two rows, to those of offset_px / f.
-std::vector<Dispersion::UncertainLamp> make_uncertain_lamps(const LampDerivatives& derivatives,
-                                                            const Eigen::Vector2d& focal_px) {
-  std::vector<Dispersion::UncertainLamp> lamps;
+/// Returns the lamps with their derivatives of offset_px, the first two rows.
+std::vector<DispersionFit::UncertainLamp> make_uncertain_lamps(const LampDerivatives& derivatives) {
+  std::vector<DispersionFit::UncertainLamp> lamps;
   lamps.reserve(derivatives.lamps.size());
-  for (std::size_t i = 0; i < derivatives.lamps.size(); ++i) {
-    const Lamp& lamp = derivatives.lamps[i];
-    const auto by_position_px =
-        derivatives.jacobian_wrt_positions.block<2, 3>(0, 3 * static_cast<Eigen::Index>(i));
-    lamps.push_back({lamp.id, lamp.position_m, *lamp.sd_m,
-                     focal_px.cwiseInverse().asDiagonal() * by_position_px});
+  for (const Lamp& lamp : derivatives.lamps) {
+    lamps.push_back({lamp, derivatives.jacobian_wrt_positions.block<2, 3>(
+                               0, 3 * static_cast<Eigen::Index>(lamps.size()))});
   }
   return lamps;
 }
@@ -61,13 +58,13 @@ void fit_chen_guan_offset(DispersionFit& fit, const ReferencePointFixes& referen
   fit.status = found.status;
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
-  fit.dispersion.covariance = found.covariance;
-  fit.dispersion.uncertain_lamps = make_uncertain_lamps(found.lamp_derivatives, focal_px);
+  fit.covariance = found.covariance;
+  fit.uncertain_lamps = make_uncertain_lamps(found.lamp_derivatives);
   set_fixes_before_and_after(fit, reference_fixes, found.used, kind);
 }
 
 void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
-                       const Eigen::Vector2d& focal_px, DispersionCircle kind) {
+                       DispersionCircle kind) {
   const auto separation = separate_camera_and_world_offsets(reference_fixes);
   if (!separation) {
     fit.status = DispersionStatus::diverged;
@@ -91,8 +88,8 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
   fit.dispersion.offset_px = separation->offset_px;
   Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>();
   covariance(1, 0) = covariance(0, 1);
-  fit.dispersion.covariance = covariance;
-  fit.dispersion.uncertain_lamps = make_uncertain_lamps(separation->lamp_derivatives, focal_px);
+  fit.covariance = covariance;
+  fit.uncertain_lamps = make_uncertain_lamps(separation->lamp_derivatives);
   const Eigen::MatrixXd world_changes_m =
       separation->lamp_derivatives.scale_jacobian_by_lamp_sds().bottomRows<2>();
   fit.world_offset_m = separation->world_m;
@@ -102,6 +99,25 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
 }
 
 }  // namespace
+
+JointCovariance add_offset_to_covariance(JointCovariance joint, const DispersionFit& fit,
+                                         const MatrixX& by_steps, const Eigen::Vector2d& focal_px) {
+  for (const auto& [lamp, jacobian] : fit.uncertain_lamps) {
+    if (joint.find_lamp_row(lamp.id, lamp.position_m)) continue;
+    joint.lamps.push_back({lamp.id, lamp.position_m});
+    append_parameters(joint, list_lamp_parameter_names(lamp.id),
+                      MatrixX::Zero(3, joint.matrix.rows()),
+                      *lamp.sd_m * *lamp.sd_m * MatrixX::Identity(3, 3));
+  }
+  const Eigen::Matrix2d per_px = focal_px.cwiseInverse().asDiagonal();
+  MatrixX jacobian = MatrixX::Zero(2, joint.matrix.rows());
+  jacobian.leftCols(by_steps.cols()) = by_steps;
+  for (const auto& [lamp, by_position] : fit.uncertain_lamps)
+    jacobian.middleCols<3>(*joint.find_lamp_row(lamp.id, lamp.position_m)) = per_px * by_position;
+  append_parameters(joint, list_pair_names(kOffsetParameter), jacobian,
+                    per_px * *fit.covariance * per_px);
+  return joint;
+}
 
 DispersionFit estimate_dispersion_offset(std::span<const ReferencePointCapture> captures,
                                          const LampMap& map, const Calibration& calibration,
@@ -125,11 +141,10 @@ DispersionFit estimate_dispersion_offset(std::span<const ReferencePointCapture> 
     fit.status = DispersionStatus::single_yaw;
   } else {
     fit.status = DispersionStatus::ok;
-    const Eigen::Vector2d focal_px = calibration.camera.focal_px();
     if (paper) {
-      fit_chen_guan_offset(fit, reference_fixes, focal_px, circle);
+      fit_chen_guan_offset(fit, reference_fixes, calibration.camera.focal_px(), circle);
     } else {
-      fit_camera_offset(fit, reference_fixes, focal_px, circle);
+      fit_camera_offset(fit, reference_fixes, circle);
     }
   }
   return fit;

@@ -64,10 +64,20 @@ struct DispersionFit {
   /// True if all detections state their sigma_px.
   bool noise_is_stated = false;
 
-  /// Offset with its uncertainty; the circle is that of `before`. The covariance follows from the
-  /// scatter of the fixes and their noise (compute_small_sample_variance_factor()),
-  /// `uncertain_lamps` from the map's sd_m. Both are absent for the enclosing circle.
-  Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0, {}};
+  /// Offset; the circle is that of `before`.
+  Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0};
+  /// Covariance of offset_px in px^2 with exact lens, zenith, lever arm and map, from the scatter
+  /// of the fixes and their noise (compute_small_sample_variance_factor()). Absent for the
+  /// enclosing circle, as are the `uncertain_lamps`.
+  std::optional<Matrix2> covariance = {};
+  /// Lamp with an sd_m whose error affects the offset.
+  struct UncertainLamp {
+    Lamp lamp;
+    /// Derivative of offset_px with respect to the position, px per meter.
+    Eigen::Matrix<double, 2, 3, Eigen::DontAlign> jacobian_wrt_position;
+  };
+  /// Detected lamps with an sd_m above zero.
+  std::vector<UncertainLamp> uncertain_lamps = {};
   /// Mean error of the corrected fixes, fixed in the world: fix minus reference point. Caused by
   /// errors of the reference point or the lamp map. Absent for method `chen_guan`, which assumes
   /// that it is zero.
@@ -90,6 +100,14 @@ struct DispersionFit {
   /// in the world.
   Circle before = {{0, 0}, 0}, after = {{0, 0}, 0};
 };
+
+/// Returns the joint covariance with the errors of an offset and of the lamps that affect it.
+///
+/// @param joint     covariance of the steps before; lamps of an adjustment keep their errors
+/// @param by_steps  derivative of offset_px / f with respect to the parameters before the lamps
+/// @pre the fit has a covariance
+JointCovariance add_offset_to_covariance(JointCovariance joint, const DispersionFit& fit,
+                                         const MatrixX& by_steps, const Eigen::Vector2d& focal_px);
 
 /// Estimates the dispersion: an offset in the undistorted image that makes fixes err with the yaw
 /// of the camera (lib/THEORY.md, "Dispersion circle").

@@ -13,6 +13,7 @@
 #include "geometry/robust_scatter.h"
 #include "geometry/statistical_bounds.h"
 #include "positioning/positioner.h"
+#include "rig/calibration_builder.h"
 #include "rig/find_lamp.h"
 
 namespace vlp {
@@ -50,8 +51,9 @@ Eigen::MatrixXd LampDerivatives::scale_jacobian_by_lamp_sds() const {
 
 ReferencePointFixes::ReferencePointFixes(std::span<const ReferencePointCapture> captures,
                                          const LampMap& map, const Calibration& calibration)
-    : captures_(captures), map_(map), calibration_(calibration) {
-  calibration_.dispersion.reset();
+    : captures_(captures),
+      map_(map),
+      calibration_(remove_dispersion_from_calibration(calibration)) {
   const Positioner positioner(map_, calibration_);
   for (const ReferencePointCapture& capture : captures_) {
     const Fix fix = locate_camera_of_capture(positioner, capture);
@@ -69,7 +71,7 @@ std::vector<std::optional<ReferencePointFixes::Estimate>>
 ReferencePointFixes::compute_capture_fixes_with_dispersion_offset(const Eigen::Vector2d& offset_px,
                                                                   const LampMap& map) const {
   Calibration calibration = calibration_;
-  calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1, {}};
+  calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1};
   const Positioner positioner(map, calibration);
   std::vector<std::optional<Estimate>> fixes(captures_.size());
   for (std::size_t i = 0; i < captures_.size(); ++i) {

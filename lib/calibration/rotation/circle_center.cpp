@@ -274,16 +274,14 @@ CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotati
     mean += circle.fit.circle.center / count;
     covariance += circle.fit.center_covariance / (count * count);
   }
-  std::optional<Matrix2> measured;
-  if (covariance.allFinite()) measured = covariance;
+  if (covariance.allFinite()) result.mean.covariance = covariance;
   double spread = 0;
   for (const LampCircle& circle : result.circles) {
     spread += (circle.fit.circle.center - mean).squaredNorm();
   }
   result.spread_px = focal_px * std::sqrt(spread / count);
   result.mean.converged = true;
-  result.mean.center =
-      make_rotation_center_from_axis_point(mean, RotationModel::shift, camera, measured);
+  result.mean.center = make_rotation_center_from_axis_point(mean, RotationModel::shift, camera);
   result.mean.residual_px = freedom > 0 ? focal_px * std::sqrt(squares / freedom) : 0;
   return result;
 }

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calibration/rotation/rotation_fit.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cassert>
 #include <cmath>
@@ -11,7 +10,6 @@
 
 #include "calibration/adjustment/adjustment.h"
 #include "geometry/frames.h"
-#include "rig/calibration_error.h"
 
 namespace vlp {
 namespace {
@@ -24,10 +22,10 @@ bool has_lamps_at_several_heights(const RotationCaptures& rotation) {
   return highest->position_m.z() - lowest->position_m.z() > kMinHeightGapFraction * height_m;
 }
 
-bool determines_lever_arm(const RotationCenter& center, const RotationCaptures& rotation) {
-  if (!center.covariance || !center.lever_arm_covariance) return false;
+bool determines_lever_arm(const RotationFit& fit, const RotationCaptures& rotation) {
+  if (!fit.center.lever_arm_m) return false;
   const double height_m = rotation.lamps.front().position_m.z() - rotation.heights.front().z_m;
-  return std::sqrt(center.lever_arm_covariance->diagonal().maxCoeff()) <=
+  return std::sqrt(fit.covariance->diagonal().tail<2>().maxCoeff()) <=
          kMaxLeverArmSdFraction * height_m;
 }
 
@@ -68,13 +66,8 @@ RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, boo
   result.converged = adjusted.has_succeeded();
   if (!result.converged) return result;
   result.center = adjusted.center;
+  result.covariance = adjusted.center_covariance();
   result.residual_px = adjusted.residual_px;
-  if (lever_arm) {
-    const auto joint = adjusted.refined_covariance.block<4, 4>(
-        count_intrinsics_with_covariance(camera), count_intrinsics_with_covariance(camera));
-    result.center.lever_arm_jacobian_wrt_zenith =
-        joint.bottomLeftCorner<2, 2>() * joint.topLeftCorner<2, 2>().inverse();
-  }
   for (const AdjustmentResult::DetectionResidual& residual : adjusted.residuals) {
     const auto is_same = [&](const RotationObservation& observation) {
       return observation.capture == residual.capture &&
@@ -98,15 +91,6 @@ Tilt compute_tilt_from_rotation_center(const RotationCenter& center) {
   return {std::atan2(up.head<2>().norm(), up.z()), std::atan2(up.y(), up.x())};
 }
 
-std::optional<double> compute_rotation_axis_sd_rad(const RotationCenter& center,
-                                                   const Camera& camera) {
-  if (!center.covariance) return std::nullopt;
-  const Eigen::Vector2d focal_px = camera.focal_px();
-  const Eigen::Vector2d variances =
-      center.covariance->diagonal().cwiseQuotient(focal_px.cwiseAbs2());
-  return std::sqrt(variances.mean());
-}
-
 Eigen::Vector2d undistorted_pixel_from_normalized_point(const Camera& camera,
                                                         const Eigen::Vector2d& z) {
   const Eigen::Vector2d focal_px = camera.focal_px();
@@ -114,17 +98,8 @@ Eigen::Vector2d undistorted_pixel_from_normalized_point(const Camera& camera,
 }
 
 RotationCenter make_rotation_center_from_axis_point(const Eigen::Vector2d& z, RotationModel model,
-                                                    const Camera& camera,
-                                                    const std::optional<Matrix2>& covariance) {
-  const Eigen::Vector2d focal_px = camera.focal_px();
-  RotationCenter center;
-  center.model = model;
-  center.center_px = undistorted_pixel_from_normalized_point(camera, z);
-  center.zenith_in_camera = z.homogeneous().normalized();
-  if (covariance) {
-    center.covariance = covariance->cwiseProduct((focal_px * focal_px.transpose()).eval());
-  }
-  return center;
+                                                    const Camera& camera) {
+  return {model, undistorted_pixel_from_normalized_point(camera, z), z.homogeneous().normalized()};
 }
 
 RotationFit fit_rotation_axis(const RotationCaptures& rotation, const Camera& camera) {
@@ -134,7 +109,7 @@ RotationFit fit_rotation_axis(const RotationCaptures& rotation, const Camera& ca
     result = fit_axis(rotation, camera, true);
   } else {
     if (has_lamps_at_several_heights(rotation)) result = fit_axis(rotation, camera, true);
-    if (!determines_lever_arm(result.center, rotation)) result = fit_axis(rotation, camera, false);
+    if (!determines_lever_arm(result, rotation)) result = fit_axis(rotation, camera, false);
   }
   if (!result.converged) return result;
   // The model is exact. Large residuals mean that the captures are no rotation about one axis.

@@ -25,10 +25,11 @@ struct RotationOutlier {
 struct RotationFit {
   /// True if the fit succeeded; otherwise the other members are not valid.
   bool converged = false;
-  /// Rotation center with its covariances, which include the map's sd_m if the method depends on
-  /// the map. `circle`: the covariance follows from the residuals; there is none without
-  /// redundancy.
   RotationCenter center = {};
+  /// Covariance of the zenith's normalized point (x/z, y/z) and, if there is one, of the lever arm
+  /// in m, with an exact lens. It includes the map's sd_m if the method depends on the map.
+  /// `circle`: it follows from the residuals; there is none without redundancy.
+  std::optional<MatrixX> covariance = {};
   /// RMS residual of the inliers per image axis, in px: sqrt(sum of squares / (measurements -
   /// unknowns)). It estimates the pixel noise. It is 0 if there are as many measurements as
   /// unknowns.
@@ -46,20 +47,13 @@ struct Tilt {
 /// Returns the tilt that the zenith of `center` corresponds to.
 Tilt compute_tilt_from_rotation_center(const RotationCenter& center);
 
-/// Returns the standard deviation of the axis direction, rad: the RMS over the two directions
-/// across it. Returns std::nullopt if `center` has no covariance.
-std::optional<double> compute_rotation_axis_sd_rad(const RotationCenter& center,
-                                                   const Camera& camera);
-
 /// Returns the pixel f * z + c of a normalized point in the undistorted image.
 Eigen::Vector2d undistorted_pixel_from_normalized_point(const Camera& camera,
                                                         const Eigen::Vector2d& z);
 
-/// Returns the rotation center whose axis appears at normalized point z in the camera. `covariance`
-/// is the covariance of z.
+/// Returns the rotation center whose axis appears at normalized point z in the camera.
 RotationCenter make_rotation_center_from_axis_point(const Eigen::Vector2d& z, RotationModel model,
-                                                    const Camera& camera,
-                                                    const std::optional<Matrix2>& covariance);
+                                                    const Camera& camera);
 
 /// Largest standard deviation of a lever arm that lamps at several heights determine, as a fraction
 /// of the lamps' height above the camera. It corresponds to 0.3 degrees of tilt.

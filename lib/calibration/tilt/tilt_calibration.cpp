@@ -159,10 +159,9 @@ std::string explain_undetermined(const Placement& placement, const LampMap& map,
 
 /// Returns the reason if a standard deviation exceeds the limits of the options, otherwise an empty
 /// string.
-std::string explain_uncertainty(const TiltCalibration& result, const Eigen::Vector2d& focal_px,
+std::string explain_uncertainty(const TiltCalibration& result,
                                 const TiltCalibrationOptions& options) {
-  const double sd_rad =
-      result.center.covariance->diagonal().cwiseSqrt().cwiseQuotient(focal_px).maxCoeff();
+  const double sd_rad = std::sqrt(result.covariance.diagonal().maxCoeff());
   if (!(sd_rad <= options.max_sd_rad)) {
     return "the standard deviation of the tilt would be " +
            format_significant_digits(deg_from_rad(sd_rad), kDigits) +
@@ -235,6 +234,7 @@ TiltCalibration estimate_camera_tilt_from_lamps(std::span<const Frame> frames, c
   if (!result.undetermined.empty()) return result;
   if (all_have_sigma(frames)) result.noise_scale = found.noise_scale;
   result.center = found.center;
+  result.covariance = found.center_covariance();
   result.residual_px = found.residual_px;
   if (options.refine_map) {
     result.corrections = found.lamps;
@@ -242,7 +242,7 @@ TiltCalibration estimate_camera_tilt_from_lamps(std::span<const Frame> frames, c
       result.map.lamps[i].position_m = found.refined_map.lamps[i].position_m;
     }
   }
-  result.undetermined = explain_uncertainty(result, camera.focal_px(), options);
+  result.undetermined = explain_uncertainty(result, options);
   return result;
 }
 

@@ -39,9 +39,11 @@ struct TiltCalibration {
   /// other members are then valid up to the step that failed.
   std::string undetermined;
 
-  /// Rotation center with model `tilt`. Its covariance is scaled by the residuals if they exceed
-  /// the given noise, and includes the errors of the map by its sd_m.
+  /// Rotation center with model `tilt`.
   RotationCenter center;
+  /// Covariance of the zenith's normalized point with an exact lens. It is scaled by the residuals
+  /// if they exceed the given noise, and includes the errors of the map by its sd_m.
+  MatrixX covariance;
   /// Lamp map with the corrections; unchanged without `refine_map`.
   LampMap map;
   /// Corrections of the detected lamps, with `refine_map` only.

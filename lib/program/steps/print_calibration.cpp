@@ -27,10 +27,10 @@ std::string format_sd(const std::optional<Matrix2>& covariance, double factor, c
   return fmt::format(", sd {:.4f} {:.4f} {}", sd.x(), sd.y(), unit);
 }
 
-void print_lever_arm(const RotationCenter& center) {
-  if (const auto& arm_m = center.lever_arm_m) {
+void print_lever_arm(const Calibration& calibration) {
+  if (const auto& arm_m = calibration.rotation_center->lever_arm_m) {
     fmt::print("lever arm   {:.3f} {:.3f} mm{}\n", 1e3 * arm_m->x(), 1e3 * arm_m->y(),
-               format_sd(center.lever_arm_covariance, 1e3, "mm"));
+               format_sd(find_parameter_covariance(calibration, kLeverArmParameter), 1e3, "mm"));
   } else {
     fmt::print("lever arm   assumed to be zero\n");
   }
@@ -105,20 +105,24 @@ void print_lens_calibration(const IntrinsicsSolution& solution, const Calibratio
   fmt::print("next view     {}\n", recommend_next_board_view(coverage));
 }
 
-void print_rotation_center(const RotationCenter& center, const Camera& camera) {
+void print_rotation_center(const Calibration& calibration) {
+  const RotationCenter& center = *calibration.rotation_center;
   fmt::print("center      {:.3f} {:.3f} px in the undistorted image{}\n", center.center_px.x(),
-             center.center_px.y(), format_sd(center.covariance, 1, "px"));
+             center.center_px.y(),
+             format_sd(compute_rotation_center_covariance(calibration), 1, "px"));
   const Eigen::Vector3d& up = center.zenith_in_camera;
   fmt::print("zenith      {:.6f} {:.6f} {:.6f} in the camera\n", up.x(), up.y(), up.z());
   const auto [angle_rad, azimuth_rad] = compute_tilt_from_rotation_center(center);
-  const auto sd_rad = compute_rotation_axis_sd_rad(center, camera);
+  const auto covariance = find_parameter_covariance(calibration, kZenithParameter);
   fmt::print("tilt        {:.4f} deg towards {:.1f} deg in the image{}\n", deg_from_rad(angle_rad),
              deg_from_rad(azimuth_rad),
-             sd_rad ? fmt::format(", sd {:.4f} deg", deg_from_rad(*sd_rad)) : "");
+             covariance
+                 ? fmt::format(", sd {:.4f} deg", deg_from_rad(std::sqrt(covariance->trace() / 2)))
+                 : "");
 }
 
 void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& rotation,
-                                const CircleCenters& circles, const Camera& camera) {
+                                const CircleCenters& circles, const Calibration& calibration) {
   fmt::print("captures    {} of {}\n", rotation.captures.size(),
              rotation.captures.size() + rotation.rejected_captures.size());
   for (const RotationHeight& height : rotation.heights) {
@@ -126,8 +130,8 @@ void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& 
                height.captures, deg_from_rad(height.arc_rad));
   }
   fmt::print("lamps       {}\n", rotation.lamps.size());
-  print_rotation_center(fit.center, camera);
-  print_lever_arm(fit.center);
+  print_rotation_center(calibration);
+  print_lever_arm(calibration);
   if (circles.circles.empty()) {
     fmt::print("circles     none determined\n");
   } else {
@@ -143,7 +147,7 @@ void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& 
   }
 }
 
-void print_dispersion_calibration(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
+void print_dispersion_calibration(const DispersionFit& fit, const Calibration& calibration,
                                   std::size_t captures) {
   const Dispersion& found = fit.dispersion;
   fmt::print("captures    {}, {} used, {} rejected as outliers, {} without a fix\n", captures,
@@ -152,12 +156,8 @@ void print_dispersion_calibration(const DispersionFit& fit, const Eigen::Vector2
   print_circle("before", fit.before);
   print_circle("after", fit.after);
   fmt::print("offset      {:.4f} {:.4f} px", found.offset_px.x(), found.offset_px.y());
-  if (const auto covariance_px2 =
-          compute_dispersion_offset_covariance_with_map_errors(found, focal_px)) {
-    fmt::print(", sd {:.4f} {:.4f} px", std::sqrt((*covariance_px2)(0, 0)),
-               std::sqrt((*covariance_px2)(1, 1)));
-  }
-  fmt::print(", fixed in the camera\n");
+  fmt::print("{}, fixed in the camera\n",
+             format_sd(compute_dispersion_offset_covariance(calibration), 1, "px"));
   if (const auto& world_m = fit.world_offset_m) {
     fmt::print(
         "world       {:.3f} {:.3f} mm, sd {:.3f} {:.3f} mm, fixed in the world: lamp map or "
@@ -185,13 +185,13 @@ void print_lamp_correction_row(int lamp, const Eigen::Vector3d& correction_m,
 void print_joint_adjustment(const AdjustmentResult& found, const Calibration& before,
                             bool lens_stated) {
   const RotationCenter& center = found.center;
-  const double focal_px = std::sqrt(found.camera.focal_px().prod());
+  const MatrixX covariance = found.center_covariance();
   fmt::print("captures    {} used, {} rejected\n", found.captures, found.rejected_captures);
   fmt::print("detections  {} used, {} rejected\n", found.detections, found.rejected_detections);
   const Eigen::Vector3d& up = center.zenith_in_camera;
   fmt::print("tilt        {:.4f} deg, sd {:.4f} deg\n",
              deg_from_rad(std::acos(std::min(1.0, up.z()))),
-             deg_from_rad(std::sqrt(center.covariance->trace() / 2) / focal_px));
+             deg_from_rad(std::sqrt(covariance.topLeftCorner<2, 2>().trace() / 2)));
   if (before.rotation_center) {
     const double cosine = std::min(1.0, up.dot(before.rotation_center->zenith_in_camera));
     fmt::print("            {:.4f} deg from the previous calibration\n",
@@ -199,8 +199,8 @@ void print_joint_adjustment(const AdjustmentResult& found, const Calibration& be
   }
   if (const auto& arm_m = center.lever_arm_m) {
     fmt::print("lever arm   {:.3f} {:.3f} mm, sd {:.3f} {:.3f} mm\n", 1e3 * arm_m->x(),
-               1e3 * arm_m->y(), 1e3 * std::sqrt((*center.lever_arm_covariance)(0, 0)),
-               1e3 * std::sqrt((*center.lever_arm_covariance)(1, 1)));
+               1e3 * arm_m->y(), 1e3 * std::sqrt(covariance(2, 2)),
+               1e3 * std::sqrt(covariance(3, 3)));
   } else {
     fmt::print("lever arm   not determined: add a rotation in place at a second height\n");
   }

@@ -19,19 +19,20 @@ void print_lens_calibration(const IntrinsicsSolution& solution, const Calibratio
 
 /// Prints a rotation center to stdout: center in px, zenith in the camera frame, and tilt in
 /// degrees. Center and tilt are followed by their standard deviations if these are known.
-void print_rotation_center(const RotationCenter& center, const Camera& camera);
+/// @pre there is a rotation center
+void print_rotation_center(const Calibration& calibration);
 
 /// Prints the result of a rotation in place to stdout, and a note if the lever arm is not
 /// observable.
 void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& rotation,
-                                const CircleCenters& circles, const Camera& camera);
+                                const CircleCenters& circles, const Calibration& calibration);
 
 /// Prints the circles of the fixes before and after the correction, and the errors of camera and
 /// world, to stdout.
 ///
-/// @param focal_px  focal lengths of the camera
-/// @param captures  number of captures at known places
-void print_dispersion_calibration(const DispersionFit& fit, const Eigen::Vector2d& focal_px,
+/// @param calibration  result of the step
+/// @param captures     number of captures at known places
+void print_dispersion_calibration(const DispersionFit& fit, const Calibration& calibration,
                                   std::size_t captures);
 
 /// Print the table of the corrections of lamps: its header, and the row of a lamp.

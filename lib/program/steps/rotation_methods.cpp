@@ -30,11 +30,11 @@ fs::path find_captures_table_file(const CaptureOptions& images, const TiltOption
   return fs::is_directory(images.images) && fs::exists(beside) ? beside : fs::path();
 }
 
-void print_tilt_calibration(const TiltCalibration& result, const Camera& camera) {
+void print_tilt_calibration(const TiltCalibration& result, const Calibration& calibration) {
   fmt::print("captures    {} used, {} of fewer than three lamps, {} rejected\n", result.captures,
              result.captures_of_few_lamps, result.captures_rejected);
   fmt::print("detections  {} used, {} rejected\n", result.detections, result.detections_rejected);
-  print_rotation_center(result.center, camera);
+  print_rotation_center(calibration);
   fmt::print(
       "residual    {:.4f} px per axis; for a level camera{} {:.4f} px in the undistorted image\n",
       result.residual_px, result.corrections.empty() ? "" : " and the original map",
@@ -72,7 +72,7 @@ void run_tilt_calibration_program(const CLI::App& app, CaptureOptions images,
     write_refined_lamp_map(refined_map, result.tilt.map, images.frontend.room);
   }
   write_calibration(images.output, result.calibration);
-  print_tilt_calibration(result.tilt, input.calibration.camera);
+  print_tilt_calibration(result.tilt, result.calibration);
 }
 
 void run_rotation_center_program(const CLI::App& app, CaptureOptions images,
@@ -89,7 +89,7 @@ void run_rotation_center_program(const CLI::App& app, CaptureOptions images,
   throw_if_step_failed(found);
   if (!plot.empty()) write_plot(plot, found.drawing());
   write_calibration(images.output, found.calibration);
-  print_rotation_calibration(found.fit, found.rotation, found.circles, input.calibration.camera);
+  print_rotation_calibration(found.fit, found.rotation, found.circles, found.calibration);
 }
 
 }  // namespace vlp

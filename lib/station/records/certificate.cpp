@@ -10,7 +10,6 @@
 
 #include "captures/digest.h"
 #include "captures/number_text.h"
-#include "positioning/correlated_errors.h"
 #include "report/calibration_sections.h"
 #include "report/html.h"
 #include "rig/calibration_error.h"
@@ -94,13 +93,13 @@ std::string make_results_section(const RunRecord& record, const Calibration& cal
   const std::string lens(lens_model_name(calibration.camera.lens_model));
   return make_html_table(table) +
          make_html_element(
-             "p", "Lens model " + lens +
-                      "; all its parameters are in the unit's calibration.yaml. The "
-                      "expanded uncertainty is the standard uncertainty times k = 2, for "
-                      "about 95 % of a normal distribution. It includes the scatter of the "
-                      "captures, the lamp map as far as lamps.yaml states its sd_m, and for the "
-                      "zenith and the dispersion the lens. " +
-                      describe_inputs(record, calibration));
+             "p",
+             "Lens model " + lens +
+                 "; all its parameters are in the unit's calibration.yaml. The "
+                 "expanded uncertainty is the standard uncertainty times k = 2, for "
+                 "about 95 % of a normal distribution. It includes the scatter of the "
+                 "captures, the lamp map as far as lamps.yaml states its sd_m, and the lens. " +
+                 describe_inputs(record, calibration));
 }
 
 /// Returns "rms_px: residuals of the board's corners, ..." for readers of the certificate only.
@@ -194,13 +193,13 @@ std::vector<CertifiedValue> collect_certified_values(const Calibration& calibrat
   add_x_and_y_values(values, "principal point", "px", {k[2], k[3]}, lens_covariance, 1, 2);
   if (const auto& center = calibration.rotation_center) {
     add_x_and_y_values(values, "rotation center, undistorted image", "px", center->center_px,
-                       center->covariance);
+                       compute_rotation_center_covariance(calibration));
     add_x_and_y_values(values, "zenith from the optical axis, 180/pi times its normalized point",
                        "deg", compute_normalized_zenith_point(*center),
-                       compute_zenith_covariance(calibration), degrees);
+                       find_parameter_covariance(calibration, kZenithParameter), degrees);
     if (center->lever_arm_m) {
       add_x_and_y_values(values, "lever arm", "mm", *center->lever_arm_m,
-                         center->lever_arm_covariance, millimeters);
+                         find_parameter_covariance(calibration, kLeverArmParameter), millimeters);
     }
   }
   if (const auto& dispersion = calibration.dispersion) {

@@ -9,6 +9,7 @@
 
 #include "calibration/adjustment/survey.h"
 #include "rig/calibration_builder.h"
+#include "rig/calibration_error.h"
 #include "support/station_verdicts.h"
 
 namespace vlp {
@@ -43,16 +44,18 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   const AdjustmentResult found = run_bundle_adjustment(survey.input);
   EXPECT_TRUE(found.has_succeeded()) << found.undetermined;
   const LampMap map = the.refined ? found.refined_map : survey.input.lamps;
-  Adjustment adjustment{{},
-                        the.refined ? found.refined_covariance : found.surveyed_covariance,
-                        {"made up"},
-                        found.captures,
-                        found.detections,
-                        found.residual_px};
-  for (const Lamp& lamp : map.lamps) adjustment.lamps.push_back({lamp.id, lamp.position_m});
+  const Adjustment adjustment{{"made up"}, found.captures, found.detections, found.residual_px};
+  std::vector<JointCovariance::LampPosition> lamps;
+  for (const Lamp& lamp : map.lamps) lamps.push_back({lamp.id, lamp.position_m});
   Calibration result = calibration;
   result.camera = found.camera;
-  return {add_adjustment_to_calibration(result, found.center, adjustment, {}), map};
+  return {add_adjustment_to_calibration(
+              result, found.center, adjustment,
+              make_adjusted_covariance(
+                  found.camera, lamps,
+                  the.refined ? found.refined_covariance : found.surveyed_covariance),
+              {}),
+          map};
 }
 
 TEST_P(RunBundleAdjustmentCovariance, FixCovarianceMatchesFixErrorsAfterAdjustment) {

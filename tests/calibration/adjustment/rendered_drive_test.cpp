@@ -97,7 +97,7 @@ class RenderedDriveCalibration : public testing::Test {
     const TiltCalibration found =
         estimate_camera_tilt_from_lamps(drive.frames, lamps, scene.camera, options);
     EXPECT_EQ(found.undetermined, "");
-    return {zenith_error(found.center), zenith_sd(found.center), 0, 0};
+    return {zenith_error(found.center), std::sqrt(found.covariance.trace()), 0, 0};
   }
   Found adjust(const Drive& drive, const std::vector<KnownMotion>& motions) const {
     AdjustmentInput input{{}, lamps, {}};
@@ -114,15 +114,13 @@ class RenderedDriveCalibration : public testing::Test {
     const AdjustmentResult found = run_bundle_adjustment(input);
     EXPECT_TRUE(found.has_succeeded() && found.center.lever_arm_m) << found.undetermined;
     if (!found.center.lever_arm_m) return {};
-    return {zenith_error(found.center), zenith_sd(found.center),
+    const MatrixX covariance = found.center_covariance();
+    return {zenith_error(found.center), std::sqrt(covariance.topLeftCorner<2, 2>().trace()),
             (*found.center.lever_arm_m - scene.mount.lever_arm_m).norm(),
-            std::sqrt(found.center.lever_arm_covariance.value().trace())};
+            std::sqrt(covariance.bottomRightCorner<2, 2>().trace())};
   }
   double zenith_error(const RotationCenter& center) const {
     return (center.zenith_in_camera - truth.rotation_center->zenith_in_camera).norm();
-  }
-  double zenith_sd(const RotationCenter& center) const {
-    return std::sqrt(center.covariance.value().trace()) / scene.camera.focal_px().x();
   }
   static void print(const char* what, const Found& found) {
     std::printf("%-28s zenith %.5f deg (sd %.5f), lever arm %.4f mm (sd %.4f)\n", what,

@@ -17,6 +17,14 @@
 namespace vlp {
 namespace {
 
+/// Returns the calibration with the dispersion of a fit and its errors.
+Calibration add_dispersion_with_covariance(Calibration calibration, const DispersionFit& fit) {
+  calibration.dispersion = fit.dispersion;
+  calibration.covariance =
+      add_offset_to_covariance({}, fit, MatrixX(2, 0), calibration.camera.focal_px());
+  return calibration;
+}
+
 constexpr int kStations = 600;
 constexpr double kStationTolerance = 0.09;
 
@@ -41,8 +49,8 @@ void expect_consistent(const Station& station, const std::vector<ReferencePointC
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     Eigen::Array4d error = Eigen::Array4d::Zero(), variance = error;
     error.head<2>() = fit.dispersion.offset_px - reference.dispersion.offset_px;
-    ASSERT_TRUE(fit.dispersion.covariance);
-    variance.head<2>() = fit.dispersion.covariance->diagonal();
+    ASSERT_TRUE(fit.covariance);
+    variance.head<2>() = fit.covariance->diagonal();
     if (world) {
       ASSERT_TRUE(fit.world_offset_m && reference.world_offset_m);
       error.tail<2>() = *fit.world_offset_m - *reference.world_offset_m;
@@ -118,11 +126,11 @@ TEST_P(EstimateDispersionOffsetWithFewCaptures, ChenGuanMethodIntervalCoversOffs
     const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
                                                 DispersionMethod::chen_guan);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
-    ASSERT_TRUE(fit.dispersion.covariance);
+    ASSERT_TRUE(fit.covariance);
     EXPECT_EQ(fit.dispersion.captures, few.count);
     for (Eigen::Index axis = 0; axis < 2; ++axis) {
       const double error = fit.dispersion.offset_px[axis] - reference.dispersion.offset_px[axis];
-      const double square = error * error / (*fit.dispersion.covariance)(axis, axis);
+      const double square = error * error / (*fit.covariance)(axis, axis);
       squares += square / (2 * kStations);
       beyond += square > 1.96 * 1.96 ? 1 : 0;
     }
@@ -206,8 +214,8 @@ TEST_P(EstimateDispersionOffsetUncertainty, Offset95PercentIntervalCoversErrorAt
     }
     const auto fit = estimate_dispersion_offset(captures, surveyed, station.believed, cell.method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
-    const auto covariance_px2 = compute_dispersion_offset_covariance_with_map_errors(
-        fit.dispersion, station.believed.camera.focal_px());
+    const auto covariance_px2 =
+        compute_dispersion_offset_covariance(add_dispersion_with_covariance(station.believed, fit));
     ASSERT_TRUE(covariance_px2);
     for (Eigen::Index axis = 0; axis < 2; ++axis) {
       const double error = fit.dispersion.offset_px[axis] - truth.dispersion.offset_px[axis];
@@ -332,12 +340,11 @@ TEST_P(PositionerAfterDispersion, FixCovarianceMatchesErrorsUnderSameAndOtherLam
     const auto captures = draw_captures(rig, GetParam(), random);
     const auto fit = estimate_dispersion_offset(captures, surveyed, station.believed, GetParam());
     ASSERT_EQ(fit.status, DispersionStatus::ok);
-    ASSERT_EQ(fit.dispersion.uncertain_lamps.size(), 8U);
-    Calibration calibration = station.believed;
-    calibration.dispersion = fit.dispersion;
+    ASSERT_EQ(fit.uncertain_lamps.size(), 8U);
+    Calibration calibration = add_dispersion_with_covariance(station.believed, fit);
     const Positioner positioner(surveyed, calibration);
     // Simulates independent errors of offset and map.
-    for (auto& lamp : calibration.dispersion->uncertain_lamps) lamp.position_m.z() += 1;
+    for (auto& lamp : calibration.covariance->lamps) lamp.position_m.z() += 1;
     const Positioner independent(surveyed, calibration);
     for (PlaceConsistency& place : places) {
       rig.camera = place.camera;

@@ -47,7 +47,7 @@ TEST(EstimateDispersionOffset, CameraMethodReturnsPrincipalPointErrorWithoutRota
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();
-  station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1, {}};
+  station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1};
   const auto captures = station.captures(12, true, {0, 0});
   const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
                                               DispersionMethod::camera);
@@ -63,7 +63,7 @@ TEST(EstimateDispersionOffset, ChenGuanMethodReturnsTrueOffsetAtOneYaw) {
     Station station(0);
     station.believed.rotation_center.reset();
     station.rig.calibration.rotation_center.reset();
-    station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1, {}};
+    station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1};
     for (const double yaw_rad : {0.0, 2.0, -1.0}) {
       const auto captures = station.captures_at(yaw_rad, 5);
       const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
@@ -126,10 +126,10 @@ TEST(EstimateDispersionOffset, RejectsQuarterOfCapturesWithReferencePointErrors)
     const auto fit =
         estimate_dispersion_offset(captures, station.rig.map, station.believed, method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
-    ASSERT_TRUE(fit.dispersion.covariance);
+    ASSERT_TRUE(fit.covariance);
     EXPECT_EQ(fit.dispersion.captures, 30);
     const Eigen::Vector2d error = fit.dispersion.offset_px - clean.dispersion.offset_px;
-    EXPECT_LT(error.dot(fit.dispersion.covariance->inverse() * error), 20);
+    EXPECT_LT(error.dot(fit.covariance->inverse() * error), 20);
   }
 }
 

@@ -358,7 +358,7 @@ TEST(EstimateDispersionOffset, CameraMethodCovariancesIncludeSmallSampleFactorAn
                                                 DispersionMethod::camera);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     EXPECT_TRUE(fit.noise_is_stated);
-    ASSERT_TRUE(fit.dispersion.covariance && fit.world_offset_m);
+    ASSERT_TRUE(fit.covariance && fit.world_offset_m);
     const auto separation = separate_camera_and_world_offsets(
         ReferencePointFixes(captures, station.rig.map, station.believed));
     ASSERT_TRUE(separation);
@@ -368,22 +368,22 @@ TEST(EstimateDispersionOffset, CameraMethodCovariancesIncludeSmallSampleFactorAn
     EXPECT_EQ(factor > 3, sigma_px < 0.1);
     EXPECT_EQ(fit.dispersion.offset_px, separation->offset_px);
     EXPECT_EQ(*fit.world_offset_m, separation->world_m);
-    expect_relatively_near(*fit.dispersion.covariance,
-                           factor * separation->covariance.topLeftCorner<2, 2>(), 1e-9);
-    EXPECT_EQ((*fit.dispersion.covariance)(0, 1), (*fit.dispersion.covariance)(1, 0));
+    expect_relatively_near(*fit.covariance, factor * separation->covariance.topLeftCorner<2, 2>(),
+                           1e-9);
+    EXPECT_EQ((*fit.covariance)(0, 1), (*fit.covariance)(1, 0));
     Eigen::Matrix2d world = factor * separation->covariance.bottomRightCorner<2, 2>();
     const Eigen::MatrixXd& jacobian = separation->lamp_derivatives.jacobian_wrt_positions;
     ASSERT_EQ(jacobian.cols(), 12);
-    ASSERT_EQ(fit.dispersion.uncertain_lamps.size(), 4U);
+    ASSERT_EQ(fit.uncertain_lamps.size(), 4U);
     for (Eigen::Index i = 0; i < 4; ++i) {
-      const auto& lamp = fit.dispersion.uncertain_lamps[static_cast<std::size_t>(i)];
+      const auto& [lamp, by_position] = fit.uncertain_lamps[static_cast<std::size_t>(i)];
       EXPECT_EQ(lamp.id, i + 1);
       EXPECT_EQ(lamp.position_m, station.rig.map.lamps[static_cast<std::size_t>(i)].position_m);
       EXPECT_EQ(lamp.sd_m, 1e-4 * static_cast<double>(i + 1));
-      EXPECT_NEAR(lamp.jacobian_wrt_position(0, 1) * 560, jacobian(0, 3 * i + 1), 1e-6);
-      EXPECT_NEAR(lamp.jacobian_wrt_position(1, 2) * 480, jacobian(1, 3 * i + 2), 1e-6);
-      EXPECT_NEAR(lamp.jacobian_wrt_position(1, 0) * 480, jacobian(1, 3 * i), 1e-6);
-      const Eigen::Matrix<double, 2, 3> change = lamp.sd_m * jacobian.block<2, 3>(2, 3 * i);
+      EXPECT_NEAR(by_position(0, 1), jacobian(0, 3 * i + 1), 1e-6);
+      EXPECT_NEAR(by_position(1, 2), jacobian(1, 3 * i + 2), 1e-6);
+      EXPECT_NEAR(by_position(1, 0), jacobian(1, 3 * i), 1e-6);
+      const Eigen::Matrix<double, 2, 3> change = *lamp.sd_m * jacobian.block<2, 3>(2, 3 * i);
       world += change * change.transpose();
     }
     expect_relatively_near(fit.world_covariance, world, 1e-9);
@@ -397,22 +397,22 @@ TEST(EstimateDispersionOffset, ChenGuanMethodReturnsOffsetCovarianceAndLamps) {
                                               setup.station.believed, DispersionMethod::chen_guan);
   ASSERT_EQ(fit.status, DispersionStatus::ok);
   const ChenGuanOffset expected = setup.estimate(true);
-  ASSERT_TRUE(fit.dispersion.covariance && expected.covariance);
+  ASSERT_TRUE(fit.covariance && expected.covariance);
   EXPECT_EQ(fit.dispersion.offset_px, expected.offset_px);
-  EXPECT_EQ(*fit.dispersion.covariance, *expected.covariance);
+  EXPECT_EQ(*fit.covariance, *expected.covariance);
   EXPECT_FALSE(fit.world_offset_m);
-  ASSERT_EQ(fit.dispersion.uncertain_lamps.size(), 1U);
-  EXPECT_EQ(fit.dispersion.uncertain_lamps[0].id, 4);
+  ASSERT_EQ(fit.uncertain_lamps.size(), 1U);
+  EXPECT_EQ(fit.uncertain_lamps[0].lamp.id, 4);
   // Without stated noise of one detection.
   setup.captures[4].detections[7].sigma_px.reset();
   const auto unstated = estimate_dispersion_offset(
       setup.captures, setup.station.rig.map, setup.station.believed, DispersionMethod::chen_guan);
   ASSERT_EQ(unstated.status, DispersionStatus::ok);
   EXPECT_FALSE(unstated.noise_is_stated);
-  ASSERT_TRUE(unstated.dispersion.covariance);
+  ASSERT_TRUE(unstated.covariance);
   const ChenGuanOffset expected_unstated = setup.estimate(false);
   ASSERT_TRUE(expected_unstated.covariance);
-  EXPECT_EQ(*unstated.dispersion.covariance, *expected_unstated.covariance);
+  EXPECT_EQ(*unstated.covariance, *expected_unstated.covariance);
 }
 
 /// One capture without a fix and one with a wrong reference point.

@@ -258,7 +258,7 @@ TEST(ReferencePointFixes, ReturnsErrorYawAndHeightOfEachFix) {
 
 TEST(ReferencePointFixes, StatisticsMatchPositionerForNoisyDetections) {
   Station station(0.01);
-  station.believed.dispersion = Dispersion{{50, 60}, 0, {0, 0}, 1, {}};  // is ignored
+  station.believed.dispersion = Dispersion{{50, 60}, 0, {0, 0}, 1};  // is ignored
   for (Lamp& lamp : station.rig.map.lamps) lamp.sd_m = 0.01;
   Random random(8);
   auto captures = station.captures(4, true, {0, 0});

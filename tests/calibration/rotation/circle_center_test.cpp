@@ -209,7 +209,7 @@ TEST(FitAndAverageLampCircleCenters, ConvergesWhenThirdYawJoinsOppositeYaws) {
     const CircleCenters found =
         fit_and_average_lamp_circle_centers(rotation, RotationScene().camera);
     ASSERT_TRUE(found.mean.converged);
-    ASSERT_TRUE(found.mean.center.covariance);
+    ASSERT_TRUE(found.mean.covariance);
     EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(RotationScene()), 2));
   }
 }

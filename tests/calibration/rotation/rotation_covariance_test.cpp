@@ -131,12 +131,6 @@ Eigen::MatrixXd compute_axis_fit_inverse(const RotationScene& scene,
   return invert_normal_equations(observe, truth);
 }
 
-Eigen::Matrix2d covariance_of_normalized_point(const RotationFit& fit, const Camera& camera) {
-  const Eigen::Vector2d inverse_px = camera.focal_px().cwiseInverse();
-  return inverse_px.asDiagonal() * Eigen::Matrix2d(*fit.center.covariance) *
-         inverse_px.asDiagonal();
-}
-
 TEST(FitRotationAxis, CovarianceMatchesDerivativesOfPixelsAtOneHeight) {
   Random random(21);
   for (const bool unequal : {false, true}) {
@@ -145,14 +139,13 @@ TEST(FitRotationAxis, CovarianceMatchesDerivativesOfPixelsAtOneHeight) {
         find_rotation(scene, make_noisy_frames(scene, 0.02, unequal, random));
     ASSERT_EQ(rotation.status, RotationStatus::ok);
     const RotationFit fit = fit_rotation_axis(rotation, scene.camera);
-    ASSERT_TRUE(fit.converged && fit.center.covariance);
+    ASSERT_TRUE(fit.converged && fit.covariance);
     ASSERT_TRUE(fit.outliers.empty());
     EXPECT_FALSE(fit.center.lever_arm_m);
-    EXPECT_FALSE(fit.center.lever_arm_covariance);
-    EXPECT_FALSE(fit.center.lever_arm_jacobian_wrt_zenith);
+    ASSERT_EQ(fit.covariance->rows(), 2);
     const Eigen::Matrix2d inverse =
         compute_axis_fit_inverse(scene, rotation, false).topLeftCorner<2, 2>();
-    const Eigen::Matrix2d found = covariance_of_normalized_point(fit, scene.camera);
+    const Eigen::Matrix2d found = *fit.covariance;
     if (unequal) {
       EXPECT_NEAR(found.trace() / inverse.trace(), 1, 0.5) << "variance of unit noise";
       expect_relatively_near(found / found.trace(), inverse / inverse.trace(), 0.01);
@@ -173,17 +166,17 @@ TEST(FitRotationAxis, CovariancesMatchDerivativesOfPixelsAtTwoHeights) {
       find_rotation(scene, make_noisy_frames(scene, 0.02, false, random));
   ASSERT_EQ(rotation.status, RotationStatus::ok);
   const RotationFit fit = fit_rotation_axis(rotation, scene.camera);
-  ASSERT_TRUE(fit.converged && fit.center.covariance && fit.center.lever_arm_covariance);
-  ASSERT_TRUE(fit.center.lever_arm_jacobian_wrt_zenith);
+  ASSERT_TRUE(fit.converged && fit.covariance && fit.center.lever_arm_m);
+  ASSERT_EQ(fit.covariance->rows(), 4);
   ASSERT_TRUE(fit.outliers.empty());
   const Eigen::MatrixXd inverse = compute_axis_fit_inverse(scene, rotation, true);
   const double variance = std::max(1.0, std::pow(fit.residual_px / 0.02, 2));
-  expect_relatively_near(covariance_of_normalized_point(fit, scene.camera),
-                         variance * inverse.topLeftCorner<2, 2>(), 0.01);
-  expect_relatively_near(*fit.center.lever_arm_covariance, variance * inverse.block<2, 2>(2, 2),
+  for (const Eigen::Index row : {0, 2}) {
+    expect_relatively_near(fit.covariance->block<2, 2>(row, row),
+                           variance * inverse.block<2, 2>(row, row), 0.01);
+  }
+  expect_relatively_near(fit.covariance->block<2, 2>(2, 0), variance * inverse.block<2, 2>(2, 0),
                          0.01);
-  expect_relatively_near(*fit.center.lever_arm_jacobian_wrt_zenith,
-                         inverse.block<2, 2>(2, 0) * inverse.topLeftCorner<2, 2>().inverse(), 0.01);
 }
 
 /// A displaced detection with a sigma_px of its own is an outlier. The residual is that of the
@@ -274,14 +267,14 @@ TEST(FitRotationAxis, OmitsLeverArmWithTooLargeStandardDeviation) {
   };
   constexpr double small_px = 0.01;
   const RotationFit small = fit_with(small_px);
-  ASSERT_TRUE(small.converged && small.center.lever_arm_covariance);
-  const double sd_m = std::sqrt(small.center.lever_arm_covariance->diagonal().maxCoeff());
+  ASSERT_TRUE(small.converged && small.center.lever_arm_m);
+  const double sd_m = std::sqrt(small.covariance->diagonal().tail<2>().maxCoeff());
   const double limit_px = small_px * 0.005 * 2.2 / sd_m;  // at the height 1.6 + 0.2 + 0.4 m
   for (const double factor : {0.9, 1.1}) {
     const RotationFit fit = fit_with(factor * limit_px);
     ASSERT_TRUE(fit.converged);
     EXPECT_EQ(fit.center.lever_arm_m.has_value(), factor < 1) << limit_px << " px";
-    EXPECT_TRUE(fit.center.covariance);
+    EXPECT_TRUE(fit.covariance);
   }
 }
 
@@ -295,31 +288,15 @@ TEST(ComputeTiltFromRotationCenter, ReturnsAngleAndAzimuthOfZenith) {
   EXPECT_NEAR(compute_tilt_from_rotation_center(center).angle_rad, std::atan(0.2 / 0.98), 1e-12);
 }
 
-TEST(ComputeRotationAxisSd, IsRmsOverBothImageAxes) {
+TEST(MakeRotationCenterFromAxisPoint, ScalesPointByFocalLengths) {
   const Camera camera = make_camera_with_unequal_focal_lengths();
-  RotationCenter center{};
-  EXPECT_FALSE(compute_rotation_axis_sd_rad(center, camera));
-  center.covariance = Matrix2{{std::pow(540 * 0.003, 2), 1}, {1, std::pow(500 * 0.004, 2)}};
-  const auto sd_rad = compute_rotation_axis_sd_rad(center, camera);
-  ASSERT_TRUE(sd_rad);
-  EXPECT_NEAR(*sd_rad, std::sqrt((9e-6 + 16e-6) / 2), 1e-12);
-}
-
-TEST(MakeRotationCenterFromAxisPoint, ScalesPointAndCovarianceByFocalLengths) {
-  const Camera camera = make_camera_with_unequal_focal_lengths();
-  const Matrix2 covariance{{2e-6, 1e-6}, {1e-6, 3e-6}};
   const RotationCenter center =
-      make_rotation_center_from_axis_point({0.3, -0.4}, RotationModel::shift, camera, covariance);
+      make_rotation_center_from_axis_point({0.3, -0.4}, RotationModel::shift, camera);
   EXPECT_EQ(center.model, RotationModel::shift);
   EXPECT_THAT(center.center_px, IsNear(Eigen::Vector2d(403 + 162, 296 - 200), 1e-9));
   EXPECT_THAT(center.zenith_in_camera,
               IsNear(Eigen::Vector3d(0.3, -0.4, 1) / std::sqrt(1.25), 1e-12));
-  ASSERT_TRUE(center.covariance);
-  EXPECT_THAT(*center.covariance, IsNear(Matrix2{{0.5832, 0.27}, {0.27, 0.75}}, 1e-12));
-  const RotationCenter without =
-      make_rotation_center_from_axis_point({0, 0}, RotationModel::tilt, camera, {});
-  EXPECT_EQ(without.model, RotationModel::tilt);
-  EXPECT_FALSE(without.covariance);
+  EXPECT_FALSE(center.lever_arm_m);
   EXPECT_THAT(undistorted_pixel_from_normalized_point(camera, {-0.1, 0.2}),
               IsNear(Eigen::Vector2d(403 - 54, 296 + 100), 1e-9));
 }

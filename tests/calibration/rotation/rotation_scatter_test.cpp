@@ -13,6 +13,7 @@
 #include "calibration/rotation/rotation_fit.h"
 #include "calibration/rotation/spot.h"
 #include "geometry/angles.h"
+#include "support/joint_covariance.h"
 #include "support/matchers.h"
 
 namespace vlp {
@@ -38,7 +39,7 @@ RotationFit draw_fit(const RotationScene& scene, const std::vector<Frame>& frame
   const RotationCaptures rotation = find_in_place_rotation_captures(noisy, scene.map, scene.camera);
   EXPECT_EQ(rotation.status, RotationStatus::ok);
   const RotationFit fit = method(rotation, scene.camera);
-  EXPECT_TRUE(fit.converged && fit.center.covariance);
+  EXPECT_TRUE(fit.converged && fit.covariance);
   return fit;
 }
 
@@ -56,8 +57,8 @@ void expect_consistent(const RotationScene& scene, Method method, bool unbiased)
   PlanarScatter scatter(method(exact, scene.camera).center.center_px);
   for (int i = 0; i < kDraws; ++i) {
     const RotationFit fit = draw_fit(scene, frames, method, random);
-    ASSERT_TRUE(fit.center.covariance);
-    scatter.add(fit.center.center_px, *fit.center.covariance);
+    ASSERT_TRUE(fit.covariance);
+    scatter.add(fit.center.center_px, center_covariance_px2(*fit.covariance, scene.camera));
   }
   expect_consistent(scatter);
   if (unbiased) {
@@ -135,14 +136,16 @@ TEST_P(FitRotationAxisWithMapErrors, ZenithAndLeverArmErrorsMatchReportedCovaria
         find_in_place_rotation_captures(with_noise(frames, random), surveyed, scene.camera);
     ASSERT_EQ(rotation.status, RotationStatus::ok);
     const RotationFit fit = fit_rotation_axis(rotation, scene.camera);
-    ASSERT_TRUE(fit.converged && fit.center.covariance);
-    ASSERT_TRUE(fit.center.lever_arm_m && fit.center.lever_arm_covariance);
+    ASSERT_TRUE(fit.converged && fit.covariance);
+    ASSERT_TRUE(fit.center.lever_arm_m);
     for (int axis = 0; axis < 2; ++axis) {
       const double zenith_px = fit.center.center_px[axis] - scene.truth().center_px[axis];
       const double arm_m = (*fit.center.lever_arm_m)[axis] - scene.lever_arm_m[axis];
-      zenith_squares += zenith_px * zenith_px / (*fit.center.covariance)(axis, axis) / (2 * maps);
-      arm_squares += arm_m * arm_m / (*fit.center.lever_arm_covariance)(axis, axis) / (2 * maps);
-      arm_variance_m2 += (*fit.center.lever_arm_covariance)(axis, axis) / (2 * maps);
+      zenith_squares += zenith_px * zenith_px /
+                        center_covariance_px2(*fit.covariance, scene.camera)(axis, axis) /
+                        (2 * maps);
+      arm_squares += arm_m * arm_m / (*fit.covariance)(2 + axis, 2 + axis) / (2 * maps);
+      arm_variance_m2 += (*fit.covariance)(2 + axis, 2 + axis) / (2 * maps);
     }
   }
   std::printf("%s: zenith e/sd %.2f, lever arm e/sd %.2f, sd %.3f mm\n", turn.name,
@@ -191,9 +194,10 @@ TEST_P(FitRotationAxisWithFewCaptures, CenterErrorsMatchCovarianceAndInliersAreK
   int with_outliers = 0;
   for (int i = 0; i < runs; ++i) {
     const RotationFit fit = draw_fit(scene, frames, fit_rotation_axis, random, false);
-    ASSERT_TRUE(fit.center.covariance);
+    ASSERT_TRUE(fit.covariance);
     const Eigen::Vector2d error = fit.center.center_px - truth;
-    distance += error.dot(fit.center.covariance->inverse() * error) / runs;
+    distance +=
+        error.dot(center_covariance_px2(*fit.covariance, scene.camera).inverse() * error) / runs;
     with_outliers += fit.outliers.empty() ? 0 : 1;
   }
   std::printf("%d captures, %d lamps: %d of %d runs with outliers, e' C^-1 e %.2f, expected %.2f\n",
@@ -294,10 +298,10 @@ TEST(FitRotationAxis, CenterAndLeverArmCovariancesMatchScatterForTwoHeights) {
   PlanarScatter center(scene.truth().center_px), lever_arm(scene.lever_arm_m);
   for (int i = 0; i < kDraws; ++i) {
     const RotationFit fit = draw_fit(scene, frames, fit_rotation_axis, random);
-    ASSERT_TRUE(fit.center.covariance);
-    ASSERT_TRUE(fit.center.lever_arm_m && fit.center.lever_arm_covariance);
-    center.add(fit.center.center_px, *fit.center.covariance);
-    lever_arm.add(*fit.center.lever_arm_m, *fit.center.lever_arm_covariance);
+    ASSERT_TRUE(fit.covariance);
+    ASSERT_TRUE(fit.center.lever_arm_m);
+    center.add(fit.center.center_px, center_covariance_px2(*fit.covariance, scene.camera));
+    lever_arm.add(*fit.center.lever_arm_m, Matrix2(fit.covariance->bottomRightCorner<2, 2>()));
   }
   expect_consistent(center);
   expect_consistent(lever_arm);

@@ -7,6 +7,7 @@
 
 #include "calibration/moving_captures.h"
 #include "calibration/tilt/tilt_calibration.h"
+#include "support/joint_covariance.h"
 #include "support/matchers.h"
 
 namespace vlp {
@@ -89,7 +90,9 @@ double mean_chi_squared(const std::vector<KnownMotion>& stated, double sd_m_per_
     EXPECT_EQ(found.undetermined, "");
     const Eigen::Vector2d error =
         found.center.center_px - rig.calibration.rotation_center->center_px;
-    sum += error.dot(found.center.covariance.value().inverse() * error) / 2;
+    sum += error.dot(center_covariance_px2(found.covariance, rig.calibration.camera).inverse() *
+                     error) /
+           2;
     EXPECT_LT(found.detections_rejected, 3);
     EXPECT_NEAR(found.noise_scale, 1, 0.3);
   }

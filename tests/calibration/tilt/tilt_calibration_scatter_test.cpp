@@ -12,6 +12,7 @@
 #include "calibration/tilt/drive.h"
 #include "calibration/tilt/tilt_calibration.h"
 #include "geometry/angles.h"
+#include "support/joint_covariance.h"
 
 namespace vlp {
 namespace {
@@ -40,11 +41,11 @@ void expect_consistent(const std::vector<Frame>& exact, const SyntheticRig& rig,
     const auto result =
         estimate_camera_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
     ASSERT_EQ(result.undetermined, "");
-    ASSERT_TRUE(result.center.covariance);
+    ASSERT_EQ(result.covariance.rows(), 2);
     ASSERT_EQ(result.corrections.size(), reference.corrections.size());
     const Eigen::Vector2d error = result.center.center_px - reference.center.center_px;
     scatter += error * error.transpose() / kDrives;
-    reported += *result.center.covariance / kDrives;
+    reported += center_covariance_px2(result.covariance, rig.calibration.camera) / kDrives;
     for (std::size_t k = 0; k < result.corrections.size(); ++k) {
       const auto at = static_cast<Eigen::Index>(3 * k);
       lamp_scatter.segment<3>(at) +=
@@ -130,12 +131,13 @@ TEST_P(EstimateTiltFromLampsWithMapErrors, ZenithErrorsMatchReportedCovariance) 
     }
     const auto result = estimate_camera_tilt_from_lamps(frames, surveyed, rig.calibration.camera);
     ASSERT_EQ(result.undetermined, "");
-    ASSERT_TRUE(result.center.covariance);
+    ASSERT_EQ(result.covariance.rows(), 2);
     const Eigen::Vector2d error =
         result.center.center_px - rig.calibration.rotation_center->center_px;
     const double focal_px = rig.calibration.camera.focal_px().x();
     for (int axis = 0; axis < 2; ++axis) {
-      const double variance = (*result.center.covariance)(axis, axis);
+      const double variance =
+          center_covariance_px2(result.covariance, rig.calibration.camera)(axis, axis);
       squares += error[axis] * error[axis] / variance / (2 * maps);
       reported_rad2 += variance / (focal_px * focal_px) / (2 * maps);
     }

@@ -10,6 +10,7 @@
 #include "calibration/tilt/drive.h"
 #include "geometry/angles.h"
 #include "geometry/similarity.h"
+#include "support/joint_covariance.h"
 #include "support/matchers.h"
 
 namespace vlp {
@@ -176,8 +177,10 @@ TEST(EstimateCameraTiltFromLamps, RejectsSwappedAndDisplacedDetections) {
   EXPECT_LE(result.detections_rejected, 20);
   const Eigen::Vector2d error =
       result.center.center_px - rig.calibration.rotation_center->center_px;
-  ASSERT_TRUE(result.center.covariance);
-  EXPECT_LT(error.dot(result.center.covariance->inverse() * error), 20);
+  ASSERT_EQ(result.covariance.rows(), 2);
+  EXPECT_LT(
+      error.dot(center_covariance_px2(result.covariance, rig.calibration.camera).inverse() * error),
+      20);
   EXPECT_NEAR(result.residual_px, 0.05, 0.03);
 }
 

@@ -25,9 +25,9 @@ struct Types {
   IntrinsicsReport report;
   RotationCenter rotation_center;
   Dispersion dispersion;
-  Dispersion::UncertainLamp uncertain_lamp;
   Adjustment adjustment;
-  Adjustment::AdjustedLamp place;
+  JointCovariance covariance;
+  JointCovariance::LampPosition place;
   HistoryEntry entry;
   HistoryEntry::Input input;
   Detection detection;
@@ -84,7 +84,6 @@ struct Functions {
   decltype(&write_lamp_map) write_map = &write_lamp_map;
   decltype(&transform_shape_point_to_world) from_shape = &transform_shape_point_to_world;
   decltype(&compute_lamp_outline_points) outline = &compute_lamp_outline_points;
-  decltype(&list_adjustment_parameter_names) names = &list_adjustment_parameter_names;
   decltype(&read_calibration) read = &read_calibration;
   decltype(&write_calibration) write = &write_calibration;
   decltype(&compute_level_from_camera_matrix) from_camera = &compute_level_from_camera_matrix;
