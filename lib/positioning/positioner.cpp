@@ -57,7 +57,6 @@ std::vector<Lamp> sorted_by_id(std::vector<Lamp> lamps) {
 
 bool is_valid_sd(double value) { return std::isfinite(value) && value >= 0; }
 
-/// Returns true if the mean is finite, and the covariance positive definite.
 /// Returns true if covariances of states with a finite variance are equal on both sides of the
 /// diagonal.
 bool is_covariance_symmetric(const BodyCovariance& covariance) {
@@ -73,14 +72,19 @@ bool is_covariance_symmetric(const BodyCovariance& covariance) {
   return true;
 }
 
-bool is_valid_prior(const BodyPrior& prior) {
-  const auto variances = prior.covariance.diagonal().array();
+/// Returns true if the covariance of a given prior is symmetric and positive definite.
+bool is_covariance_valid(const BodyPrior& prior) {
   const PriorTerms terms = compute_prior_terms(prior, EvaluatedState(BodyState()));
-  return (variances >= 0).all() && variances.tail<5>().isFinite().all() &&
-         is_covariance_symmetric(prior.covariance) &&
-         compute_state_difference(prior.mean, {}).allFinite() &&
+  return is_covariance_symmetric(prior.covariance) &&
          std::ranges::all_of(terms.list(),
                              [](const PriorTerm& term) { return term.row.allFinite(); });
+}
+
+/// Returns true if the mean is finite, and the variances not negative.
+bool is_valid_prior(const BodyPrior& prior) {
+  const auto variances = prior.covariance.diagonal().array();
+  return (variances >= 0).all() && variances.tail<5>().isFinite().all() &&
+         compute_state_difference(prior.mean, {}).allFinite();
 }
 
 bool are_values_valid(const Sensors& sensors) {
@@ -202,7 +206,8 @@ class Positioner::Impl {
   Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
                            std::span<const EarlierFrame> earlier) const {
     BodyPrior prior = make_prior(sensors);
-    if (!are_values_valid(sensors) || !is_valid_prior(prior) || !are_times_valid(earlier))
+    if (!are_values_valid(sensors) || !is_valid_prior(prior) ||
+        (sensors.prior && !is_covariance_valid(prior)) || !are_times_valid(earlier))
       return make_fix_without_pose(FixStatus::not_finite, 0);
     FrameObservations frame;
     FixStatus status = make_observations(detections, 0, prior, frame);
