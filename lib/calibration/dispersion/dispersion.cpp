@@ -40,17 +40,6 @@ bool all_have_sigma(std::span<const ReferencePointCapture> captures) {
   });
 }
 
-/// Returns the lamps with their derivatives of offset_px, the first two rows.
-std::vector<DispersionFit::UncertainLamp> make_uncertain_lamps(const LampDerivatives& derivatives) {
-  std::vector<DispersionFit::UncertainLamp> lamps;
-  lamps.reserve(derivatives.lamps.size());
-  for (const Lamp& lamp : derivatives.lamps) {
-    lamps.push_back({lamp, derivatives.jacobian_wrt_positions.block<2, 3>(
-                               0, 3 * static_cast<Eigen::Index>(lamps.size()))});
-  }
-  return lamps;
-}
-
 void fit_chen_guan_offset(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
                           const Eigen::Vector2d& focal_px, DispersionCircle kind) {
   const ChenGuanOffset found =
@@ -59,7 +48,7 @@ void fit_chen_guan_offset(DispersionFit& fit, const ReferencePointFixes& referen
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
   fit.covariance = found.covariance;
-  fit.uncertain_lamps = make_uncertain_lamps(found.lamp_derivatives);
+  fit.lamp_derivatives = found.lamp_derivatives;
   set_fixes_before_and_after(fit, reference_fixes, found.used, kind);
 }
 
@@ -89,7 +78,8 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
   Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>();
   covariance(1, 0) = covariance(0, 1);
   fit.covariance = covariance;
-  fit.uncertain_lamps = make_uncertain_lamps(separation->lamp_derivatives);
+  fit.lamp_derivatives = separation->lamp_derivatives;
+  fit.lamp_derivatives.jacobian_wrt_positions.conservativeResize(2, Eigen::NoChange);
   const Eigen::MatrixXd world_changes_m =
       separation->lamp_derivatives.scale_jacobian_by_lamp_sds().bottomRows<2>();
   fit.world_offset_m = separation->world_m;
@@ -102,7 +92,8 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
 
 JointCovariance add_offset_to_covariance(JointCovariance joint, const DispersionFit& fit,
                                          const MatrixX& by_steps, const Eigen::Vector2d& focal_px) {
-  for (const auto& [lamp, jacobian] : fit.uncertain_lamps) {
+  const auto& [lamps, by_positions] = fit.lamp_derivatives;
+  for (const Lamp& lamp : lamps) {
     if (joint.find_lamp_row(lamp.id, lamp.position_m)) continue;
     joint.lamps.push_back({lamp.id, lamp.position_m});
     append_parameters(joint, list_lamp_parameter_names(lamp.id),
@@ -112,8 +103,10 @@ JointCovariance add_offset_to_covariance(JointCovariance joint, const Dispersion
   const Eigen::Matrix2d per_px = focal_px.cwiseInverse().asDiagonal();
   MatrixX jacobian = MatrixX::Zero(2, joint.matrix.rows());
   jacobian.leftCols(by_steps.cols()) = by_steps;
-  for (const auto& [lamp, by_position] : fit.uncertain_lamps)
-    jacobian.middleCols<3>(*joint.find_lamp_row(lamp.id, lamp.position_m)) = per_px * by_position;
+  for (std::size_t i = 0; i < lamps.size(); ++i) {
+    jacobian.middleCols<3>(*joint.find_lamp_row(lamps[i].id, lamps[i].position_m)) =
+        per_px * by_positions.middleCols<3>(3 * static_cast<Eigen::Index>(i));
+  }
   append_parameters(joint, list_pair_names(kOffsetParameter), jacobian,
                     per_px * *fit.covariance * per_px);
   return joint;

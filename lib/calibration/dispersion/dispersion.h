@@ -53,6 +53,18 @@ enum class DispersionStatus {
 /// Describes the status and the remedy, human-readable.
 std::string_view describe_dispersion_status(DispersionStatus status);
 
+/// Derivatives of a vector of quantities with respect to the positions of lamps. Unit: that of the
+/// quantity, per m. `lamps` are the detected ones with an sd_m in the map.
+struct LampDerivatives {
+  std::vector<Lamp> lamps;
+  /// Matrix of the derivatives: one row for each quantity, three columns (x, y, z) for each lamp.
+  Eigen::MatrixXd jacobian_wrt_positions;
+
+  /// Returns the changes of the quantities for errors of one standard deviation, one column per
+  /// lamp coordinate.
+  Eigen::MatrixXd scale_jacobian_by_lamp_sds() const;
+};
+
 /// Result of estimate_dispersion_offset(). Members after `noise_is_stated` are valid only if
 /// the status is `ok`.
 struct DispersionFit {
@@ -67,17 +79,10 @@ struct DispersionFit {
   /// Offset; the circle is that of `before`.
   Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0};
   /// Covariance of offset_px in px^2 with exact lens, zenith, lever arm and map, from the scatter
-  /// of the fixes and their noise (compute_small_sample_variance_factor()). Absent for the
-  /// enclosing circle, as are the `uncertain_lamps`.
+  /// of the fixes and their noise (compute_small_sample_variance_factor()); derivatives of
+  /// offset_px with respect to the lamps. Absent for the enclosing circle.
   std::optional<Matrix2> covariance = {};
-  /// Lamp with an sd_m whose error affects the offset.
-  struct UncertainLamp {
-    Lamp lamp;
-    /// Derivative of offset_px with respect to the position, px per meter.
-    Eigen::Matrix<double, 2, 3, Eigen::DontAlign> jacobian_wrt_position;
-  };
-  /// Detected lamps with an sd_m above zero.
-  std::vector<UncertainLamp> uncertain_lamps = {};
+  LampDerivatives lamp_derivatives = {};
   /// Mean error of the corrected fixes, fixed in the world: fix minus reference point. Caused by
   /// errors of the reference point or the lamp map. Absent for method `chen_guan`, which assumes
   /// that it is zero.

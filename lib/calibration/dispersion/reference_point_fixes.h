@@ -12,18 +12,6 @@
 /// Statistics of all fixes at a reference point. Captures without a fix are ignored.
 namespace vlp {
 
-/// Derivatives of a vector of quantities with respect to the positions of lamps. Unit: that of the
-/// quantity, per m. `lamps` are the detected ones with an sd_m in the map.
-struct LampDerivatives {
-  std::vector<Lamp> lamps;
-  /// Matrix of the derivatives: one row for each quantity, three columns (x, y, z) for each lamp.
-  Eigen::MatrixXd jacobian_wrt_positions;
-
-  /// Returns the changes of the quantities for errors of one standard deviation, one column per
-  /// lamp coordinate.
-  Eigen::MatrixXd scale_jacobian_by_lamp_sds() const;
-};
-
 /// Position fixes of captures at a reference point, as functions of the dispersion's offset.
 class ReferencePointFixes {
  public:

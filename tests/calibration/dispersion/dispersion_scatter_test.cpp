@@ -340,7 +340,7 @@ TEST_P(PositionerAfterDispersion, FixCovarianceMatchesErrorsUnderSameAndOtherLam
     const auto captures = draw_captures(rig, GetParam(), random);
     const auto fit = estimate_dispersion_offset(captures, surveyed, station.believed, GetParam());
     ASSERT_EQ(fit.status, DispersionStatus::ok);
-    ASSERT_EQ(fit.uncertain_lamps.size(), 8U);
+    ASSERT_EQ(fit.lamp_derivatives.lamps.size(), 8U);
     Calibration calibration = add_dispersion_with_covariance(station.believed, fit);
     const Positioner positioner(surveyed, calibration);
     // Simulates independent errors of offset and map.
