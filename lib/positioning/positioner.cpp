@@ -290,12 +290,13 @@ class Positioner::Impl {
     if (sensors.prior) {
       static_cast<StatePrior&>(prior) = *sensors.prior;
     } else {
-      const KnownMotion motion = sensors.motion.value_or(KnownMotion());
-      prior.mean.motion = {motion.velocity_m_per_s, motion.yaw_rate_rad_per_s,
-                           sensors.inclination.value_or(Inclination{0, 0})};
-      prior.set_sd(kBodyVelocity, motion.velocity_sd_m_per_s);
-      prior.set_sd(kBodyYawRate, motion.yaw_rate_sd_rad_per_s);
-      prior.set_sd(kBodyRoll, sensors.inclination_sigma_rad);
+      if (const auto& motion = sensors.motion) {
+        prior.mean.motion = {motion->velocity_m_per_s, motion->yaw_rate_rad_per_s, {}};
+        prior.set_sd(kBodyVelocity, motion->velocity_sd_m_per_s);
+        prior.set_sd(kBodyYawRate, motion->yaw_rate_sd_rad_per_s);
+      }
+      if (sensors.inclination) prior.mean.motion.inclination = *sensors.inclination;
+      if (sensors.inclination_sigma_rad > 0) prior.set_sd(kBodyRoll, sensors.inclination_sigma_rad);
       if (const auto& height = sensors.height) {
         prior.mean.pose.position_m.z() = height->z_m;
         prior.set_sd(kBodyZ, height->sd_m);
