@@ -703,9 +703,43 @@ void LightDetector::reject_lights_of_other_size(const std::optional<InverseHeigh
                                               : log_ratio > max_centroid_off;
     if (is_other) {
       reject(*light, LightReason::reflection);
-    } else if (!has_outline(*light) && are_even && light->stripes.periods < kMinReliablePeriods) {
+    } else if (!has_outline(*light) && light->stripes.periods < kMinReliablePeriods) {
       reject(*light, LightReason::too_few_periods);
     }
+  }
+}
+
+void LightDetector::reject_misplaced_lights(const std::optional<InverseHeight>& inverse_height,
+                                            std::vector<MeasuredLight>& lights) const {
+  constexpr int min_lamps = 2;
+  constexpr double max_off_fraction = 0.1;
+  if (!inverse_height) return;
+  struct Place {
+    MeasuredLight* light;
+    const Lamp* lamp;
+    Eigen::Vector2d at_m;  // in the level frame
+  };
+  std::vector<Place> reliable, others;
+  for (MeasuredLight& light : lights) {
+    const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps_.lamps, *light.lamp) : nullptr;
+    const auto at = shape_.level_plane_point_from_pixel(light.pixel);
+    if (!lamp || !at) continue;
+    const double height_m =
+        1 / inverse_height->compute_radius_in_plane(1, compute_height_beyond_first_lamp_m(*lamp));
+    auto& places = light.stripes.periods < kMinReliablePeriods ? others : reliable;
+    places.push_back({&light, lamp, height_m * *at});
+  }
+  if (std::ssize(reliable) < min_lamps) return;
+  for (const Place& place : others) {
+    const bool is_centroid = !has_outline(*place.light) && place.lamp->shape.size_m;
+    const double center_error_m = is_centroid ? place.lamp->shape.size_m->maxCoeff() / 2 : 0;
+    const auto contradicts = [&](const Place& other) {
+      const double expected_m = (place.lamp->position_m - other.lamp->position_m).head<2>().norm();
+      return std::abs((place.at_m - other.at_m).norm() - expected_m) >
+             center_error_m + max_off_fraction * expected_m;
+    };
+    if (2 * std::ranges::count_if(reliable, contradicts) > std::ssize(reliable))
+      reject(*place.light, LightReason::unknown_period);
   }
 }
 
@@ -764,6 +798,7 @@ void LightDetector::identify_lamps_of_lights(const std::optional<InverseHeight>&
     reject_contradicting_periods(lamps_, *camera_.row_time_s, lights);
   }
   for (const Lamp& lamp : lamps_.lamps) keep_best_light_of_lamp(lamp.id, lights);
+  reject_misplaced_lights(inverse_height, lights);
   const bool sure = std::ranges::any_of(lights, [](const Light& light) {
     return light.lamp && light.stripes.periods >= kMinReliablePeriods;
   });

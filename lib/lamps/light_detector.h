@@ -119,6 +119,10 @@ class LightDetector {
                                         std::vector<MeasuredLight>& lights) const;
   void identify_lamps_of_lights(const std::optional<InverseHeight>& inverse_height,
                                 const ImageSize& size, std::vector<MeasuredLight>& lights) const;
+  /// Rejects lights with few periods whose distances from most lamps with more periods differ from
+  /// those of the map by more than 10 % of the distance, and the radius without an outline.
+  void reject_misplaced_lights(const std::optional<InverseHeight>& inverse_height,
+                               std::vector<MeasuredLight>& lights) const;
   /// Rejects lights whose radius differs from that of their lamp, if at least three others agree.
   void reject_lights_of_other_size(const std::optional<InverseHeight>& inverse_height,
                                    std::vector<MeasuredLight>& lights) const;
