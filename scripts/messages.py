@@ -123,7 +123,6 @@ CLEAR = [
     "is not YAML",
     "is now called",
     "is of a ",
-    "is too old",
     "is where lamp",
     "lacks '",
     "lacks a right",

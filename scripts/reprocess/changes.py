@@ -1,11 +1,6 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Compares the results of an archive with earlier ones, and checks the gates of the archive.
-
-README.md describes pairs, statistic, verdict and gates. A vanished session has a folder in RESULTS or a row in the
-earlier results, and no folder in the archive. A lost result belongs to a session that has none now and had one in the
-earlier results or in former/.
-"""
+"""Compares the results of an archive with earlier ones, and checks the gates of the archive (README.md)."""
 import json
 import math
 import re
@@ -14,9 +9,9 @@ from collections import Counter
 
 import yaml
 
-from plausibility import lost_inputs, session_name
+from plausibility import WITHOUT_RESULT, find_cause, lost_inputs, session_name
 
-VERDICTS_WITH_RESULT = ("pass", "review", "gate", "look")  # "look": former name of "review", in earlier results
+VERDICTS_WITH_RESULT = ("pass", "review", "gate")
 MIN_CAMERAS = 20  # as vlp-evaluate requires 20 reference points
 MAX_EQUAL_CHANGE_MM = 0.001  # below all measurement uncertainties
 
@@ -131,8 +126,6 @@ GATES = {
     "worse_fraction": (0, 1, lambda _, now, items: now and (now["worse"] / now["pairs"] if now["pairs"] else None)),
     "mean_difference_mm": (-math.inf, math.inf, lambda *args: args[1] and args[1].get("interval_95_mm", [None] * 2)[1]),
 }
-FORMER_GATES = {f"{name}_share": f"{name}_fraction" for name in ("no_result", "gate", "worse")}
-FORMER_GATES |= {name: "review_fraction" for name in ("look_share", "look_fraction")}
 DEFAULT_GATES = {"vanished": 0, "suspect": 0}
 COMPLETENESS_GATES = ("no_result", "no_result_fraction")  # exit code 3 if one is not met
 
@@ -154,12 +147,20 @@ def find_lost_results(rows, before_rows, had_result):
 
 
 def list_suspects(rows, before_rows):
-    """Returns the descriptions of sessions that are not plausible, or lost inputs that they had in earlier results."""
+    """Returns the descriptions of sessions that are not plausible, lost inputs that they had in earlier results, or
+    have those that another session had there; and of earlier results with other inputs of every session."""
     before, found = {session_name(row): row for row in before_rows}, []
+    owners = {row["inputs"]: name for name, row in before.items()}
+    both = [row for row in rows if session_name(row) in before]
+    if len(both) > 1 and all(row["inputs"] != before[session_name(row)]["inputs"] for row in both):
+        found.append(f"--previous: all of {len(both)} sessions have other inputs there: is it of this archive?")
     for row in rows:
         name = session_name(row)
+        was, owner = before.get(name, {}), owners.get(row["inputs"], name)
         known = [reason for reason in row.get("suspect", "").split("; ") if reason]
-        if reasons := dict.fromkeys([*known, *lost_inputs(row, before.get(name, {}))]):
+        moved = owner != name and was.get("inputs") != row["inputs"]
+        known = [f"has the inputs that {owner} had: renamed or exchanged?"] * moved + known
+        if reasons := dict.fromkeys([*known, *lost_inputs(row, was)]):
             found.append(f"{name}: {'; '.join(reasons)}")
     return found
 
@@ -208,8 +209,6 @@ def read_gates(file):
     if set(document) != {"format", "gates"} or not isinstance(gates, dict) or not gates:
         raise ValueError(f"{file}: should hold format and gates: {{NAME: LIMIT}}")
     for name, limit in gates.items():
-        if name in FORMER_GATES:
-            raise ValueError(f"{file}: gate '{name}' is now called '{FORMER_GATES[name]}'")
         if name not in GATES:
             raise ValueError(f"{file}: gate '{name}' is unknown; there are: {', '.join(GATES)}")
         if isinstance(limit, bool) or not isinstance(limit, (int, float)) or not math.isfinite(limit):
@@ -247,6 +246,13 @@ def count_reasons(rows):
     failed = [row for row in rows if row["verdict"] not in VERDICTS_WITH_RESULT]
     reasons = Counter(re.sub(re.escape(session_name(row)) + "/?", "", row["reason"]) for row in failed)
     return sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
+
+
+def describe_first(rows, verdicts):
+    """Returns ", as CAMERA/SESSION: REASON", with the cause first, of the first session with one of these verdicts."""
+    row = next((row for row in rows if row["verdict"] in verdicts), None)
+    causes = find_cause(row) if row and row["verdict"] not in WITHOUT_RESULT else []
+    return f", as {session_name(row)}: {'; '.join([*causes, row['reason']])}" if row else ""
 
 
 def join_items(items, max_items=20):

@@ -8,19 +8,13 @@ from pathlib import Path
 from changes import read_gates
 from files import digest, file_digest, read_table
 
-PROGRAMS = ["vlp-calibrate", "vlp-evaluate"]  # the second compares captures for the overview
+PROGRAM = "vlp-calibrate"
 BAD_INPUT, INCOMPLETE = 2, 3  # exit codes of reprocess.sh
 
 
 def fail(message, code=BAD_INPUT):
     print(f"reprocess.sh: error: {message}", file=sys.stderr)
     sys.exit(code)
-
-
-def check_programs(folder):
-    for program in PROGRAMS:
-        if not (folder / program).is_file():
-            fail(f"{folder / program}: missing; run scripts/test.sh first")
 
 
 def check_previous(previous, results):
@@ -30,14 +24,15 @@ def check_previous(previous, results):
     if previous.resolve() == results.resolve():
         fail(f"{previous}: this run writes there; --previous is another folder, e.g. a copy")
     rows = read_table(table)
-    if not rows or not {"camera", "session", "verdict", "mean_mm", "inputs"} <= set(rows[0]):
-        fail(f"{table}: is not the summary of an earlier run: a column is missing, or all rows")
+    if missing := {"camera", "session", "verdict", "mean_mm", "inputs"} - set(rows[0] if rows else ()):
+        words = "is not the summary of an earlier run: a column is missing, or all rows"
+        fail(f"{table}: {words}: {', '.join(sorted(missing))}")
 
 
 def check_session_gates(options):
     """Checks the file of --session-gates with vlp-calibrate, which reports an invalid file before a missing session."""
     if options.session_gates:
-        command = [options.bin / "vlp-calibrate", "/dev/null", "-o", "/dev/null", "--gates", options.session_gates]
+        command = [options.bin / PROGRAM, "/dev/null", "-o", "/dev/null", "--gates", options.session_gates]
         errors = subprocess.run(command, capture_output=True, text=True, check=False).stderr.strip()
         if "error: /dev/null" not in errors:
             fail(errors.split("error: ", 1)[-1])
@@ -45,7 +40,8 @@ def check_session_gates(options):
 
 def check(options):
     """Reports invalid options before anything is run."""
-    check_programs(options.bin)
+    if not (options.bin / PROGRAM).is_file():
+        fail(f"{options.bin / PROGRAM}: missing; run scripts/test.sh first")
     for file in (options.gates, options.session_gates):
         if file and not file.is_file():
             fail(f"{file}: is not a file")
@@ -61,12 +57,6 @@ def check(options):
 
 def toolbox(folder):
     """Returns the version of vlp-calibrate, and a digest of it and of the script that reads its results."""
-    program = folder / PROGRAMS[0]
-    # Both run in parallel, because a start takes 0.2 s, mostly to load libraries.
-    nothing = subprocess.DEVNULL
-    with subprocess.Popen([program, "--batch-stdin"], stdin=nothing, stdout=nothing, stderr=nothing) as each:
-        stated = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
-    if each.returncode != 0:
-        raise ValueError(f"{program}: vlp-calibrate is too old for these scripts")
-    files = [program, Path(__file__).parent / "outcome.py"]
+    stated = subprocess.run([folder / PROGRAM, "--version"], capture_output=True, text=True, check=True).stdout
+    files = [folder / PROGRAM, Path(__file__).parent / "outcome.py"]
     return {"version": stated.split()[-1], "toolbox": digest("".join(file_digest(file) for file in files))}

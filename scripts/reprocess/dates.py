@@ -4,10 +4,10 @@
 others are ignored), or else the date in the name of the session, as in 2026-03-14 or 20260314-b."""
 import re
 import sys
-from datetime import datetime, timezone
+from datetime import datetime, timedelta, timezone
 from functools import lru_cache
 
-from files import read_table
+from files import INPUTS, read_table
 from plausibility import count_inputs
 
 COLUMNS = {"camera", "session", "date", "room", "files"} | {"fault", "damage", "damaged"}  # the latter of vlp-simulate
@@ -49,13 +49,18 @@ def read_archive_table(archive):
             raise ValueError(f"{file}:{line}: {name} occurs twice; remove one row")
         date = (row.get("date") or "").strip()
         try:
-            date = date and parse_utc(date).isoformat()
+            utc = date and parse_utc(date)
         except ValueError:
             raise ValueError(f"{file}:{line}: date: should be as 2026-03-14 or 2026-03-14T09:30, not {date}") from None
+        if utc and not datetime(2000, 1, 1) <= utc <= datetime.now() + timedelta(days=1):
+            raise ValueError(f"{file}:{line}: date: {date} is before 2000 or in the future: was a clock wrong?")
+        date = utc and utc.isoformat()
         try:
-            count_inputs(files := (row.get("files") or "").strip())
+            unknown = set(count_inputs(files := (row.get("files") or "").strip())) - set(INPUTS)
         except ValueError:
             raise ValueError(f"{file}:{line}: files: should be as 'boards 20, check 12', not {files}") from None
+        if unknown:
+            raise ValueError(f"{file}:{line}: files: {min(unknown)!r} is no input; these are: {', '.join(INPUTS)}")
         stated[name] = (date.removesuffix("T00:00:00"), (row.get("room") or "").strip(), files)
     return stated
 

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from checks import fail
+from files import print_lines
 from outcome import collect_remarks
 
 
@@ -83,9 +84,7 @@ def main():
     now = find_result(results, name)
     is_folder = other and Path(other).is_dir()
     before = find_result(Path(other), name) if is_folder else find_former_result(results, name, other)
-    print(f"{before} -> {now}")
-    for line in list_differences(load(before), load(now)):
-        print(line)
+    print_lines([f"{before} -> {now}", *list_differences(load(before), load(now))])
 
 
 if __name__ == "__main__":

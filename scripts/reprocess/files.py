@@ -7,6 +7,7 @@ import io
 import json
 import os
 import re
+import sys
 from pathlib import Path
 
 # Inputs of vlp-calibrate in a session (lib/session/session_folder.h), except line drives, which only its report uses.
@@ -73,6 +74,14 @@ def read_table(file):
         lines = csv.reader(stream)
         columns = next(lines, [])
         return [dict(zip(columns, map(unescape_formula, line))) for line in lines if line]
+
+
+def print_lines(lines):
+    """Prints lines. A reader that has ended, as `| head`, is no error."""
+    try:
+        print("\n".join(lines), flush=True)
+    except BrokenPipeError:
+        sys.stdout = open(os.devnull, "w")  # its buffer is written at the end of the program
 
 
 def json_text(value):

@@ -10,12 +10,6 @@ from outcome import TRACKED_UNITS
 MAX_PLOTS = 12
 
 
-def describe_column(column):
-    """Describes a column of fleet.csv: "focal x (px)" for "focal_x_px"."""
-    name, axis, unit = column.rsplit("_", 2)
-    return f"{name.replace('_', ' ')} {axis} ({unit})"
-
-
 def describe_session(end):
     return f"{end['camera']}/{end['session']}" + (f" of {end['date']}" if end["date"] else "")
 
@@ -32,7 +26,8 @@ def cameras(fleet, fleet_rows):
     html, rows = '<h2 id="cameras">Cameras that changed</h2>\n', []
     for alarm in fleet["cameras"]:
         for change in alarm["changes"]:
-            words = describe_column(change["column"]), f"{change['change']:+.4g} ± {change['sd']:.2g}"
+            name, axis, unit = change["column"].rsplit("_", 2)
+            words = f"{name.replace('_', ' ')} {axis} ({unit})", f"{change['change']:+.4g} ± {change['sd']:.2g}"
             rows.append((alarm["camera"], *words, describe_date(change), format_probability(change["p"])))
     html += table(["camera", "parameter", "change", "step or drift", "false alarm probability"], rows, "changes.json")
     pictured = {alarm["camera"] for alarm in fleet["cameras"][:MAX_PLOTS]}

@@ -33,6 +33,7 @@ LAMP_COLUMNS = ["room", "map", "lamp", "camera", "session", "date", "captures", 
 LAMP_COLUMNS += ["offset_x_mm", "offset_y_mm", "offset_x_sd_mm", "offset_y_sd_mm"]
 # Columns of the rows of a shard.
 SHARD_COLUMNS = list(dict.fromkeys([*SUMMARY_COLUMNS, *FLEET_COLUMNS, "lamps", "gate_metrics", "fingerprint"]))
+SHARD_COLUMNS += ["copyable", "former_inputs"]
 TIMED_OUT = -signal.SIGALRM
 # Output files of vlp-calibrate that are kept, and their names in the results.
 KEPT_FILES = {name: name for name in ("calibration.yaml", "evaluation.json", "session.json")}

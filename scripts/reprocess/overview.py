@@ -2,50 +2,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes changes.json and overview.html from summary.csv, in RESULTS. The page is self-contained and has no scripts."""
 import gc
-import subprocess
-import tempfile
 from html import escape
 from pathlib import Path
 
 import fleet_page
 import pictures
 from changes import DEFAULT_GATES, VERDICTS_WITH_RESULT, check_gates, collect_gate_items, compare_results, count_reasons
-from changes import count_failed_sessions, count_verdicts, find_lost_results, find_vanished_sessions, is_incomplete
-from changes import join_items, list_suspects, load_json, read_gates, rows_with_mean, session_name
+from changes import count_failed_sessions, count_verdicts, describe_first, find_lost_results, find_vanished_sessions
+from changes import is_incomplete, join_items, list_suspects, load_json, read_gates, rows_with_mean, session_name
 from files import json_text, read_table, write_atomically
 from fleet import analyze_fleet
 from pictures import number, picture, table
+from plausibility import WITHOUT_RESULT
 
-MAX_PLOTS = 6
+MAX_LISTED = 6  # sessions that differ most
 MAX_EXAMINED = 200  # sessions with changed inputs whose changed files are listed
 
 STYLE = """body { font: 16px/1.5 sans-serif; max-width: 60rem; margin: 1rem auto; padding: 0 1rem; color: #222 }
 table { border-collapse: collapse } td, th { text-align: left; padding: 0.2rem 0.8rem; border-bottom: 1px solid #ccc }
 .wide { overflow-x: auto } img { max-width: 100% } .verdict { font-size: 2rem; font-weight: bold }"""
-
-
-def compare_captures(run, truth, now, before):
-    """Returns the verdict of vlp-evaluate on the comparison of the captures of one session."""
-    with tempfile.TemporaryDirectory() as folder:
-        command = [run["bin"] + "/vlp-evaluate", now, "--truth", truth, "--compare", before]
-        command += ["--threads", "1", "--json", folder + "/evaluation.json"]
-        if subprocess.run(command, capture_output=True, check=False).returncode not in (0, 1):  # 1: a gate is missed
-            return "cannot be compared"
-        return load_json(Path(folder) / "evaluation.json")["comparison"]["verdict"]
-
-
-def list_largest_differences(run, previous, pairs):
-    html, plots, rows = "<h2>Sessions that differ most</h2>\n", "", []
-    for row, old, change in pairs[:MAX_PLOTS]:
-        name, truth = session_name(row), Path(run["archive"]) / session_name(row) / "check/truth.csv"
-        before, now = (folder / "sessions" / name / "fixes.csv" for folder in (previous, Path(".")))
-        exist = all(file.exists() for file in (truth, now, before))
-        compared = "the same" if change == 0 else compare_captures(run, truth, now, before) if exist else ""
-        rows.append((name, old["mean_mm"], row["mean_mm"], f"{change:+.4g}", compared or "fixes are missing"))
-        data, scale = pictures.floor(truth, before, now) if exist and change != 0 else (None, 0)
-        if data:
-            plots += picture(data, f"{name}: errors over the floor, before and now, magnified {scale} times")
-    return html + table(["session", "before (mm)", "now (mm)", "change (mm)", "vlp-evaluate"], rows) + plots
 
 
 def read_input_digests(results, name):
@@ -71,7 +46,7 @@ def changed_inputs(previous, rows, before, changes):
     return html + (f"<p>and {more} more, in changes.json</p>\n" if more else "")
 
 
-def comparison(run, previous, rows, before, changes, pairs):
+def comparison(previous, rows, before, changes, pairs):
     html = "<h2>Comparison with earlier results</h2>\n"
     counts = [(words, changes[key]) for words, key in COUNTED]
     html += table(["", "sessions"], [(words, len(one) if isinstance(one, list) else one) for words, one in counts])
@@ -81,15 +56,11 @@ def comparison(run, previous, rows, before, changes, pairs):
             low, high = changes["interval_95_mm"]
             html += f", 95 % interval {low:.4g} to {high:.4g} mm"
         html += f": <strong>{escape(changes['verdict'])}</strong></p>\n"
-        means = [(float(old["mean_mm"]), float(row["mean_mm"])) for row, old, _ in pairs]
-        html += picture(pictures.scatter(sorted(means)), "Mean error of each session, before and now")
-        html += list_largest_differences(run, previous, pairs)
+        cells = [(session_name(row), old["mean_mm"], row["mean_mm"], f"{change:+.4g}") for row, old, change in pairs]
+        html += "<h2>Sessions that differ most</h2>\n"
+        html += table(["session", "before (mm)", "now (mm)", "change (mm)"], cells[:MAX_LISTED])
     if changes["changed_inputs"]:
         html += changed_inputs(previous, rows, before, changes)
-    if changes["newly_failed"]:
-        html += "<h2>Newly without a result</h2>\n"
-        by_name = {session_name(row): row["reason"] for row in rows}
-        html += table(["session", "reason"], [(name, by_name[name]) for name in changes["newly_failed"]])
     return html
 
 
@@ -131,8 +102,8 @@ def list_actions(document, items, rows):
         actions.append((f"Check the gates that are not met: {', '.join(missed)}", "gates"))
     without_result = counts["no_result"] + counts["crashed"]
     for number, words, section in (
-        (without_result, "have no result", "failed"),
-        (counts["gate"], "miss a gate of their own", "session-gates"),
+        (without_result, "have no result" + describe_first(rows, WITHOUT_RESULT), "failed"),
+        (counts["gate"], "miss a gate of their own" + describe_first(rows, ("gate",)), "session-gates"),
         (counts["review"], "passed with remarks", "review"),
     ):
         if number and section not in [known for _, known in actions]:
@@ -209,7 +180,7 @@ def main():
     if means[0]:
         parts += "<h2>Errors</h2>\n" + picture(pictures.distribution(*means), "Mean errors of the sessions")
     if changes:
-        parts += comparison(run, Path(compare["previous"]), rows, before, changes, pairs)
+        parts += comparison(Path(compare["previous"]), rows, before, changes, pairs)
     document = {"counts": counts, "changes": changes, "gates": results, "passed": passed, "fleet": fleet}
     document |= {"vanished": vanished, "lost_results": lost, "suspect": items["suspect"]}
     write_atomically("changes.json", json_text({"format": "vlp-archive-changes/2", **document}))

@@ -5,8 +5,6 @@ import base64
 import subprocess
 from html import escape
 
-from files import read_table
-
 BEFORE, NOW = "#E69F00", "#0072B2"  # from the palette of Okabe and Ito
 MAX_POINTS = 4000
 MAX_ROWS = 200  # of a table
@@ -42,15 +40,6 @@ def distribution(now, before):
     return render(script + "plot " + ", ".join(plots) + "\n")
 
 
-def scatter(pairs):
-    """pairs: (before, now)."""
-    script = block("pairs", pairs) + "set xlabel 'before (mm)'\nset ylabel 'now (mm)'\nset logscale xy\n"
-    script += f"set size square\nset key top left\nset xtics add {BETWEEN}\nset ytics add {BETWEEN}\n"
-    script += "plot x with lines lc rgb '#888888' title 'equal', "
-    script += f"$pairs with points pt 7 ps 0.4 lc rgb '{NOW}' title 'a session'\n"
-    return render(script, "520,520")
-
-
 def over_time(series, words, dated, since=None):
     """series: {name: [(time, value, sd)]}; days since 1970 where they are dated; since: where the change is."""
     script = f"set ylabel '{words}'\nset offsets graph 0.05, 0.05, 0.1, 0.1\nset key top left\n"
@@ -70,34 +59,6 @@ def over_time(series, words, dated, since=None):
         style = f"with yerrorbars pt 7 ps 0.5 lc rgb '{(NOW, BEFORE)[number % 2]}' title '{name}'"
         plots.append(f"$series{number} using 1:2:3 {style}")
     return render(script + "plot " + ", ".join(plots) + "\n", "640,320")
-
-
-def errors(truth_file, fixes_file):
-    truth = {row["image"]: row for row in read_table(truth_file)}
-    vectors = []
-    for row in read_table(fixes_file):
-        true = truth.get(row["image"])
-        if row["status"] == "ok" and true:
-            x, y = float(true["x_m"]), float(true["y_m"])
-            vectors.append((x, y, float(row["x_m"]) - x, float(row["y_m"]) - y))
-    return vectors
-
-
-def floor(truth_file, before_file, now_file):
-    """Returns a plot of the error vectors over the floor, before and now, and the factor by which they are enlarged."""
-    before, now = errors(truth_file, before_file), errors(truth_file, now_file)
-    if not before or not now:
-        return None, 0
-    largest = max((dx * dx + dy * dy) ** 0.5 for _, _, dx, dy in before + now) or 1e-9
-    scale = 0.15 / largest
-    exponent = 10 ** (len(str(int(scale))) - 1)
-    scale = max(1, int(scale / exponent) * exponent)
-    script = block("before", [(x, y, scale * dx, scale * dy) for x, y, dx, dy in before])
-    script += block("now", [(x, y, scale * dx, scale * dy) for x, y, dx, dy in now])
-    script += "set size ratio -1\nset xlabel 'x (m)'\nset ylabel 'y (m)'\nset offsets graph 0.1, 0.1, 0.1, 0.1\n"
-    script += f"plot $before with vectors lw 2 dt 2 lc rgb '{BEFORE}' title 'before', "
-    script += f"$now with vectors lw 2 lc rgb '{NOW}' title 'now'\n"
-    return render(script, "520,380"), scale
 
 
 def table(columns, rows, where="summary.csv"):

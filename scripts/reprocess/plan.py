@@ -25,9 +25,10 @@ from pathlib import Path
 
 import run_page
 from catalogue import SCANS, Catalogue
+from changes import join_items
 from checks import INCOMPLETE, check, fail, toolbox
 from dates import read_dates
-from files import digest, json_text, table, write_if_changed, write_atomically
+from files import digest, json_text, print_lines, table, write_if_changed, write_atomically
 from layout import LAYOUT, check_layout, describe_wrong_level, list_sessions_in
 from session_gates import read_limits
 
@@ -84,6 +85,7 @@ def list_sessions(archive):
 
 
 def write_shards(archive, sessions, state, options):
+    """Returns a description of the scan, missing sessions, and shards with changed results."""
     dates, missing = read_dates(archive, sessions)
     write_if_changed(state / "dates.csv", table(["camera", "session", "date", "room", "files"], dates))
     catalogue = Catalogue(state / "catalogue.sqlite", archive, options.rebuild_catalogue)
@@ -100,16 +102,15 @@ def write_shards(archive, sessions, state, options):
             file.unlink()
     write_if_changed(state / "shards.txt", f"{len(wanted)}\n")
     catalogue.save(shards, options.shard_size)
-    return describe_scan(catalogue, look), missing
+    changed = find_changed_results(state.parent, shards) if look == "files" else {}
+    names = join_items([name for names in changed.values() for name in names], 5)
+    return describe_scan(catalogue, look) + f"; missing or changed results: {names}" * bool(changed), missing, changed
 
 
 def describe_scan(catalogue, look):
-    if look == "files":
-        return "checked all files"
-    if not catalogue.all_files_at_ns():
-        return "checked folders and tables, never all files"
-    day = time.strftime("%Y-%m-%d", time.localtime(catalogue.all_files_at_ns() / 1e9))
-    return f"checked folders and tables, all files last on {day}"
+    at_s = catalogue.all_files_at_ns() / 1e9
+    last = f"all files last on {time.strftime('%Y-%m-%d', time.localtime(at_s))}" if at_s else "never all files"
+    return "checked all files" if look == "files" else f"checked folders and tables, {last}"
 
 
 def modification_time_ns(file):
@@ -117,16 +118,31 @@ def modification_time_ns(file):
     return file.stat().st_mtime_ns if file.exists() else None
 
 
-def list_pending_shards(state, summary):
+def find_changed_results(results, shards):
+    """Returns {number of a shard: sessions} whose results are missing, or were changed since its rows were written."""
+    changed = {}
+    for number, names in shards.items():
+        made_ns = modification_time_ns(results / f".state/rows/{number:06d}.csv")
+        for name in names if made_ns else ():
+            places = [place for place in (results / "sessions" / name, results / "failed" / name) if place.is_dir()]
+            found = [file.stat() for place in places for file in (place, *place.iterdir())]
+            if not found or any(one.st_mtime_ns > made_ns or one.st_size == 0 for one in found):
+                changed.setdefault(number, []).append(name)
+    return changed
+
+
+def list_pending_shards(state, summary, changed=()):
     """Returns the shards that Snakemake has to consider, and those of them that have to run in any case. The rows of
     all other shards are newer than list and options, and older than the summary. Shards run in any case if their rows
-    are missing although there is a summary, or if sessions crashed, which may have lacked memory or disk space."""
+    are missing although there is a summary, if a result was changed, or if sessions crashed, which may have lacked
+    memory or disk space."""
     options, summed_up = modification_time_ns(state / "run.json"), modification_time_ns(summary)
     known, again = [], []
     for file in sorted((state / "shards").glob("*.list")):
         rows = state / "rows" / f"{file.stem}.csv"
         made = modification_time_ns(rows)
-        if (made is None and summed_up is not None) or (made is not None and b",crashed," in rows.read_bytes()):
+        crashed = made is not None and b",crashed," in rows.read_bytes()
+        if (made is None and summed_up is not None) or crashed or int(file.stem) in changed:
             again.append(file.stem)
         elif None not in (made, summed_up) and max(modification_time_ns(file), options) <= made <= summed_up:
             continue
@@ -157,12 +173,12 @@ def main():
         "camera": " ".join(options.camera_option),
         **toolbox(options.bin),
     }
-    looked, missing = write_shards(archive, sessions, state, options)
+    looked, missing, changed = write_shards(archive, sessions, state, options)
     limits = read_limits(options.session_gates) if options.session_gates else {}
     write_if_changed(state / "session_gates.json", json_text(limits))
     write_if_changed(state / "keep.txt", f"{options.keep}\n")
     write_if_changed(state / "run.json", json_text(run))
-    known, again = list_pending_shards(state, results / "summary.csv")
+    known, again = list_pending_shards(state, results / "summary.csv", changed)
     write_atomically(state / "to_do.txt", "".join(f"{shard}\n" for shard in known))
     write_atomically(state / "again.txt", "".join(f".state/rows/{shard}.csv\n" for shard in again))
     previous = options.previous.resolve() if options.previous else None
@@ -176,7 +192,7 @@ def main():
     }
     write_if_changed(state / "compare.json", json_text(compare))
     run_page.write(results)
-    print(f"{len(sessions)} sessions in {archive}; {looked}")
+    print_lines([f"{len(sessions)} sessions in {archive}; {looked}"])
 
 
 if __name__ == "__main__":

@@ -1,12 +1,15 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Finds sessions that are not plausible among those of the archive: copies, lost inputs, unusual metrics, and a lens or
-a rotation that is that of another camera."""
+"""Finds sessions that are not plausible among those of the archive: copies, lost inputs, unusual or missing metrics, a
+lens or a rotation that is that of another camera."""
+import json
 import math
 import statistics
 from collections import Counter, defaultdict
 
 MIN_SESSIONS = 8  # with a metric, for a median
+MAX_ODD_FRACTION = 0.1  # of the sessions, or one: what all others have is usual
+WITHOUT_RESULT = ("no result", "crashed")
 MIN_DEVIATION = 6  # robust standard deviations of the logarithm
 # Ratio to the median from which a metric is unusual; below 1 if larger values are better.
 UNUSUAL_RATIO = {"mtf50": 0.85, "mean_mm": 5, "height_rms_mm": 5, "yaw_rms_deg": 5, "dispersion_mm": 5}
@@ -36,15 +39,45 @@ def session_name(row):
     return f"{row['camera']}/{row['session']}"
 
 
-def find_copies(rows):
-    first = {}
+def rows_with_result(rows):
+    return [row for row in rows if row.get("verdict") not in WITHOUT_RESULT]
+
+
+def find_usual(values):
+    """Returns the value that all sessions but a few have; None if there is none, or too few sessions."""
+    value, count = Counter(values).most_common(1)[0] if len(values) >= MIN_SESSIONS else (None, 0)
+    return value if len(values) - count <= max(1, MAX_ODD_FRACTION * len(values)) else None
+
+
+def find_lost_inputs(rows):
+    """Yields inputs with fewer files than the session had before, or than almost all sessions with a result have."""
+    counts = [count_inputs(row["files"]) for row in rows_with_result(rows) if row.get("files")]
+    usual = Counter({name: find_usual([count[name] for count in counts]) or 0 for name in set().union(*counts)})
     for row in rows:
-        if row.get("inputs") and first.setdefault(row["inputs"], row) is not row:
-            yield session_name(row), f"is a copy of {session_name(first[row['inputs']])}"
+        expected = count_inputs(row.get("expected", ""))
+        expected |= usual if row.get("verdict") not in WITHOUT_RESULT else Counter()
+        yield from ((session_name(row), reason) for reason in lost_inputs(row, {"expected": format_counts(expected)}))
+
+
+def find_copies(rows):
+    first, former = {}, {row["former_inputs"]: row for row in rows if row.get("former_inputs")}
+    for row in rows:
+        name, inputs = session_name(row), row.get("inputs")
+        if inputs and (other := first.setdefault(inputs, row)) is not row:
+            yield name, f"is a copy of {session_name(other)}"
+            continue
+        if (other := former.get(inputs, row)) is not row:
+            yield name, f"has the inputs that {session_name(other)} had: renamed or exchanged?"
+        for part in json.loads(row.get("copyable") or "{}").items():
+            if (other := first.setdefault(part, row)) is not row:
+                yield name, f"{part[0]}: the same files as in {session_name(other)}"
 
 
 def find_unusual_metrics(rows):
+    complete = rows_with_result(rows)
     for metric, limit in UNUSUAL_RATIO.items():
+        if find_usual([bool(row.get(metric)) for row in complete]):
+            yield from ((session_name(row), f"{metric} is not known") for row in complete if not row.get(metric))
         logs = {session_name(row): math.log(float(row[metric])) for row in rows if float(row.get(metric) or 0) > 0}
         if len(logs) < MIN_SESSIONS:
             continue
@@ -80,15 +113,25 @@ def find_foreign_inputs(rows):
                 yield part, name, words + f"{nearest:.2g} px from {other}"
 
 
+def find_cause(row):
+    """Returns the first warning of a session, in the order of the steps, in a list; or the first skipped images."""
+    remarks = [words for words in row.get("remarks", "").split("; ") if words]
+    warnings = [words for words in remarks if "skipped" not in words and not words.startswith("the first, ")]
+    return (warnings or remarks)[:1]
+
+
 def find_suspects(rows):
-    """Returns {CAMERA/SESSION: list of reasons}."""
-    found = defaultdict(list)
-    for name, reason in [*find_copies(rows), *find_unusual_metrics(rows)]:
+    """Returns {CAMERA/SESSION: list of reasons}, causes first."""
+    found, unusual = defaultdict(list), defaultdict(list)
+    for name, reason in find_unusual_metrics(rows):
+        unusual[name].append(reason)
+    for name, reason in [*find_lost_inputs(rows), *find_copies(rows)]:
         found[name].append(reason)
     for part, name, reason in find_foreign_inputs(rows):
         # A camera that was tilted in the meantime can have the rotation center of another one, but usual errors.
-        if part == "boards" or found[name]:
-            found[name].insert(0, reason)
+        if part == "boards" or unusual[name]:
+            found[name].append(reason)
     for row in rows:
-        found[session_name(row)] += lost_inputs(row, row)
+        if reasons := unusual[session_name(row)]:
+            found[session_name(row)] += find_cause(row) + reasons
     return found

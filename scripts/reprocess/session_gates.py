@@ -19,12 +19,6 @@ def read_limits(file):
     return {name: float(limit) for name, limit in yaml.safe_load(file.read_text())["gates"].items()}
 
 
-def is_met(name, value, limit):
-    if value is None:
-        return False
-    return value >= limit if name in AT_LEAST else value <= limit
-
-
 def describe_missed(name, value, limit):
     """Returns the text of vlp-calibrate, for example "mean_mm is 1.25 mm, at most 1 mm is required"."""
     unit = next((f" {unit}" for end, unit in UNITS.items() if name.endswith(f"_{end}")), "")
@@ -39,6 +33,8 @@ def apply_session_gates(row, limits):
     known = json.loads(row["gate_metrics"])
     gates = known["gates"] | limits
     checked = [(name, known["metrics"].get(name), limit) for name, limit in gates.items()]
-    missed = [describe_missed(*gate) for gate in checked if not is_met(*gate)]
+    signs = {name: -1 if name in AT_LEAST else 1 for name in gates}
+    is_met = [value is not None and signs[name] * value <= signs[name] * limit for name, value, limit in checked]
+    missed = [describe_missed(*gate) for gate, met in zip(checked, is_met) if not met]
     passed = "review" if row["remarks"] or row["rejected_lamps"] else "pass"
     row["verdict"], row["reason"] = ("gate", "; ".join(missed)) if missed else (passed, "")

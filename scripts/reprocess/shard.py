@@ -18,14 +18,13 @@ import time
 from pathlib import Path
 
 from catalogue import input_digests
-from files import digest, json_text, read_table, table, write_atomically
+from files import digest, file_digest, json_text, read_table, table, write_atomically
 from outcome import SHARD_COLUMNS, KEPT_FILES, read_outcome
-from plausibility import count_inputs, format_counts
+from plausibility import WITHOUT_RESULT, count_inputs, format_counts
 
 STATE = Path(".state")
 TIME_LIMIT_S = 3600
-
-WITHOUT_RESULT = ("no result", "crashed")
+COPYABLE = ("boards", "rotation", "dispersion", "check")  # inputs that no two sessions share
 
 
 def result_folder(name, verdict):
@@ -37,20 +36,20 @@ def compute_key(inputs, run):
 
 
 def read_row(place):
-    """Returns the row of a result; None if it cannot be read."""
+    """Returns the row of a result; None if it cannot be read, or if it or a file of the result was changed."""
     try:
-        return json.loads((place / "row.json").read_text())
-    except (FileNotFoundError, NotADirectoryError, ValueError):
+        row = json.loads((place / "row.json").read_text())
+        is_unchanged = row.pop("checksum", None) in (None, digest(json_text(row)))
+        is_intact = all(file_digest(place / file) == was for file, was in row.get("results", {}).items())
+        return row if is_unchanged and is_intact else None
+    except (OSError, ValueError):
         return None
 
 
 def find_current_row(name, key):
     """Returns the row of the existing result with this key; None if there is none, or if the session crashed."""
-    for place in (Path("sessions") / name, Path("failed") / name):
-        row = read_row(place)
-        if row and row["key"] == key and row["verdict"] != "crashed":
-            return row
-    return None
+    rows = (read_row(Path(place) / name) for place in ("sessions", "failed"))
+    return next((row for row in rows if row and row["key"] == key and row["verdict"] != "crashed"), None)
 
 
 class BatchProcess:
@@ -122,7 +121,7 @@ def delete_result(result, name):
 
 
 def archive_result(place, name, keep):
-    """Moves a former result to former/KEY. Deletes it if none is kept, if it crashed, or if it has no row."""
+    """Moves a former result to former/KEY. Deletes it if none is kept, if it crashed, or if it was changed."""
     row = read_row(place) if keep > 0 else None
     if not row or row["verdict"] == "crashed":
         return delete_result(place, name)
@@ -157,7 +156,8 @@ def publish(row, work, keep=0):
     for file in KEPT_FILES:
         if (work / name / file).is_file():
             link_or_copy(work / name / file, ready / KEPT_FILES[file])
-    write_atomically(ready / "row.json", json_text(row))
+    row = row | {"results": {file.name: file_digest(file) for file in ready.iterdir()}}
+    write_atomically(ready / "row.json", json_text(row | {"checksum": digest(json_text(row))}))
     place = result_folder(name, row["verdict"])
     place.parent.mkdir(parents=True, exist_ok=True)
     for former in (Path("sessions") / name, Path("failed") / name):
@@ -174,11 +174,13 @@ def append_line(folder, shard, *words):
         log.write("\t".join(words) + "\n")
 
 
-def expect_inputs(name, counts):
-    """Returns the columns `files`, the number of files of each input, and `expected`, the largest one so far."""
+def expect_inputs(name, inputs, counts):
+    """Returns the columns `files`, the number of files of each input, `expected`, the largest one so far, and
+    `former_inputs`, the last other digest of the inputs."""
     old = read_row(Path("sessions") / name) or read_row(Path("failed") / name) or {}
-    expected = count_inputs(old.get("expected", "")) | counts
-    return {"files": format_counts(counts), "expected": format_counts(expected)}
+    expected = format_counts(count_inputs(old.get("expected", "")) | counts)
+    former = old["inputs"] if old.get("inputs", inputs) != inputs else old.get("former_inputs", "")
+    return {"files": format_counts(counts), "expected": expected, "former_inputs": former}
 
 
 def read_previous_rows(shard):
@@ -229,7 +231,7 @@ def reprocess(run, shard, fingerprints, lock, keep):
                     finish(*at_work, answer)
                 known = {"key": key, "inputs": inputs, "parts": parts, "version": run["version"]}
                 known |= {"options": run["camera"], "toolbox": run["toolbox"][:12]}
-                at_work = name, known | expect_inputs(name, counts), unreadable
+                at_work = name, known | expect_inputs(name, inputs, counts), unreadable
                 made += 1
         if at_work:
             finish(*at_work, each.answer())
@@ -250,6 +252,8 @@ def main():
         # A job that the cluster abandoned may still run.
         fcntl.flock(lock, fcntl.LOCK_EX)
         rows = reprocess(run, shard, dict(line.split("\t") for line in lines), lock, keep)
+    for row in rows:
+        row["copyable"] = json.dumps({part: row["parts"][part][:16] for part in COPYABLE if part in row["parts"]})
     write_atomically(STATE / "rows" / f"{shard}.csv", table(SHARD_COLUMNS, rows))
 
 

@@ -1,15 +1,14 @@
 # SPDX-FileCopyrightText: The VLP calibration toolbox authors
 # SPDX-License-Identifier: Apache-2.0
-"""Prints a summary of a run over an archive. Exit code 3: no session has a result, or more than a gate allows have
-none; 1: another gate of the archive or of a session is not met."""
+"""Prints a summary of a run over an archive. Exit code 3: too few sessions have a result; 1: a gate is not met."""
 import sys
 import time
 from pathlib import Path
 
 from changes import VERDICTS_WITH_RESULT, collect_gate_items, count_failed_sessions, count_reasons, is_incomplete
-from changes import join_items, load_json, session_name
+from changes import describe_first, join_items, load_json, session_name
 from checks import INCOMPLETE
-from files import read_table
+from files import print_lines, read_table
 from layout import describe_missing_inputs
 from run_page import restore
 
@@ -48,45 +47,50 @@ def describe_missed_gate(gate, items):
     return words + (f": {join_items(items[gate['name']])}" if items.get(gate["name"]) else "")
 
 
+def describe(results, document, rows, items):
+    """Yields the lines of the summary."""
+    counts, changes, fleet = document["counts"], document["changes"], document["fleet"]
+    yield f"this run    {describe_run(results / '.state', counts['sessions'])}"
+    yield f"passed      {counts['pass']}"
+    yield f"review      {counts['review']} passed with remarks; see the overview"
+    yield f"gates       {counts['gate']} with a result that misses a gate"
+    yield f"no result   {counts['no_result']}, and {counts['crashed']} that crashed; see failed/"
+    yield from (f"            {count} of them: {reason}" for reason, count in count_reasons(rows)[:MAX_REASONS])
+    named = {"lost_results": ("lost", " had a result before"), "vanished": ("vanished", " no longer in the archive")}
+    for name, (title, words) in (named | {"suspect": ("suspect", "")}).items():
+        if items[name]:
+            yield f"{title:11} {len(items[name])}{words}: {join_items(items[name])}"
+    if "median_mm" in counts:
+        yield f"error       {counts['median_mm']:.3f} mm in the median session, 90 % below {counts['p90_mm']:.3f} mm"
+    cost_s = sum(float(row["cpu_s"] or 0) for row in rows)
+    each_s = cost_s / counts["sessions"]
+    yield f"cost        {cost_s:.1f} s of processor time for all results, {each_s:.2f} s a session"
+    yield f"fleet       {len(fleet['cameras'])} cameras changed, {len(fleet['lamps'])} lamps were moved"
+    if changes:
+        failed, verdict = len(changes["newly_failed"]), changes.get("verdict", "nothing to compare")
+        words = f"changed     {changes['better']} better, {changes['worse']} worse, {changes['same']} the same, "
+        yield words + f"{failed} newly without a result: {verdict}"
+        if changes["changed_inputs"]:
+            lost = len(changes["lost_with_changed_inputs"])
+            yield f"inputs      {changes['changed_inputs']} with changed inputs, {lost} of them lost their result"
+    yield f"overview    {results / 'overview.html'}"
+
+
 def main():
     results = Path(sys.argv[1])
     restore(results)
     document, rows = load_json(results / "changes.json"), read_table(results / "summary.csv")
-    counts, changes, fleet = document["counts"], document["changes"], document["fleet"]
-    items = collect_gate_items(document["vanished"], document["lost_results"], fleet, document["suspect"])
-    cost_s = sum(float(row["cpu_s"] or 0) for row in rows)
-    print(f"this run    {describe_run(results / '.state', counts['sessions'])}")
-    print(f"passed      {counts['pass']}")
-    print(f"review      {counts['review']} passed with remarks; see the overview")
-    print(f"gates       {counts['gate']} with a result that misses a gate")
-    print(f"no result   {counts['no_result']}, and {counts['crashed']} that crashed; see failed/")
-    for reason, count in count_reasons(rows)[:MAX_REASONS]:
-        print(f"            {count} of them: {reason}")
-    if items["lost_results"]:
-        print(f"lost        {len(items['lost_results'])} had a result before: {join_items(items['lost_results'])}")
-    if items["vanished"]:
-        print(f"vanished    {len(items['vanished'])} no longer in the archive: {join_items(items['vanished'])}")
-    if items["suspect"]:
-        print(f"suspect     {len(items['suspect'])}: {join_items(items['suspect'])}")
-    if "median_mm" in counts:
-        print(f"error       {counts['median_mm']:.3f} mm in the median session, 90 % below {counts['p90_mm']:.3f} mm")
-    each_s = cost_s / counts["sessions"]
-    print(f"cost        {cost_s:.1f} s of processor time for all results, {each_s:.2f} s a session")
-    print(f"fleet       {len(fleet['cameras'])} cameras changed, {len(fleet['lamps'])} lamps were moved")
-    if changes:
-        print(f"changed     {changes['better']} better, {changes['worse']} worse, {changes['same']} the same,", end=" ")
-        print(f"{len(changes['newly_failed'])} newly without a result: {changes.get('verdict', 'nothing to compare')}")
-        if changes["changed_inputs"]:
-            lost = len(changes["lost_with_changed_inputs"])
-            print(f"inputs      {changes['changed_inputs']} with changed inputs, {lost} of them lost their result")
-    print(f"overview    {results / 'overview.html'}")
+    counts = document["counts"]
+    items = collect_gate_items(document["vanished"], document["lost_results"], document["fleet"], document["suspect"])
+    print_lines(describe(results, document, rows, items))
     for gate in document["gates"]:
         if not gate["passed"]:
             print(describe_missed_gate(gate, items), file=sys.stderr)
     if beyond := count_failed_sessions(counts, document["gates"]):
-        many = f"{beyond} of {counts['sessions']} sessions"
+        first = describe_first(rows, ("gate",))
         # [ARCHIVE-4] `miss a gate`
-        print(f"reprocess.sh: {many} miss a gate of their own; gate_fraction of --gates allows more", file=sys.stderr)
+        words = f"reprocess.sh: {beyond} of {counts['sessions']} sessions miss a gate of their own{first}"
+        print(f"{words}; gate_fraction of --gates allows more", file=sys.stderr)
     if is_incomplete(counts, document["gates"]):
         archive = Path(load_json(results / ".state/run.json")["archive"])
         print(f"reprocess.sh: error: {describe_incomplete(archive, rows)}", file=sys.stderr)

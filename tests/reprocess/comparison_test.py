@@ -52,12 +52,20 @@ class Changes(unittest.TestCase):
             self.assertEqual(changes.compare_results(rows, rows)[0]["verdict"], "the same")
 
     def test_names_suspects_and_inputs_lost_since_earlier_results(self):
-        rows = [row(0, "review", 1) | {"suspect": "is a copy of c/1"}, row(1, "pass", 1) | {"files": "boards 20, check 6"}]
+        rows = [row(0, "review", 1, "0") | {"suspect": "is a copy of c/1"}, row(1, "pass", 1) | {"files": "boards 20, check 6"}]
         before = [row(1, "pass", 1) | {"expected": "boards 20, check 12"}]
         expected = ["c0000/s0: is a copy of c/1", "c0000/s1: check has 6 of 12 files"]
         self.assertEqual(changes.list_suspects(rows, before), expected)
         rows[1]["suspect"] = "mean_mm is 9; check has 6 of 12 files"
         self.assertEqual(changes.list_suspects(rows, before)[1], "c0000/s1: mean_mm is 9; check has 6 of 12 files")
+
+    def test_names_sessions_exchanged_with_earlier_results_and_those_of_another_archive(self):
+        rows, before = ([row(i, "pass", 1, str(i ^ exchanged)) for i in range(3)] for exchanged in (1, 0))
+        rows[2]["inputs"] = "2"
+        words = ["c0000/s0: has the inputs that c0000/s1 had: renamed or exchanged?", "c0000/s1: has the inputs that c0000/s0 had: renamed or exchanged?"]
+        self.assertEqual(changes.list_suspects(rows, before), words)
+        foreign = changes.list_suspects(rows, [row(i, "pass", 1, f"foreign {i}") for i in range(3)])
+        self.assertEqual(foreign, ["--previous: all of 3 sessions have other inputs there: is it of this archive?"])
 
     def test_interval_covers_truth_in_95_percent(self):
         # Sessions of a camera are correlated: intervals over sessions would cover only 83 %.
@@ -158,8 +166,6 @@ class Changes(unittest.TestCase):
                 ("format: vlp-archive-gates/1\n", "should hold"),
                 ("format: vlp-archive-gates/1\ngates: {}\n", "should hold"),
                 ("format: vlp-archive-gates/1\ngates: {odd: 1}\n", "gate 'odd' is unknown; there are: no_result, .*cameras_changed, "),
-                ("format: vlp-archive-gates/1\ngates: {look_share: 0}\n", "gate 'look_share' is now called 'review_fraction'"),
-                ("format: vlp-archive-gates/1\ngates: {look_fraction: 0}\n", "'look_fraction' is now called 'review_fraction'"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: .inf}\n", "should be a number"),
                 ("format: vlp-archive-gates/1\ngates: {mean_mm: true}\n", "should be a number"),
                 ("format: vlp-archive-gates/1\ngates: {worse_fraction: 7}\n", "a fraction from 0 to 1, not 7"),

@@ -74,8 +74,7 @@ run
 # Another content is reprocessed, it alone. A session that is repaired moves from failed/ to sessions/.
 sed -i '1a # changed' "$archive/$good/lamps.yaml"
 mv "$archive/$broken" "$results-broken"
-cp -r "$archive/$good" "$archive/$broken"
-echo '# not a copy' >>"$archive/$broken/lamps.yaml"
+cp -r "$scratch/archive/camera-00004/session-01" "$archive/$broken"
 run
 [ "$(redone)" = "$(printf '%s/row.json\n' "$good" "$broken" | sort)" ] || fail "another content is not seen, or too much"
 [ -e "$results/sessions/$broken" ] && [ ! -e "$results/failed/$broken" ] || fail "$broken is repaired"

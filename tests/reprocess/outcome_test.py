@@ -113,6 +113,9 @@ class Dates(unittest.TestCase):
             self.assertEqual([line["date"] for line in lines], ["2026-03-14T07:30:00", "2026-03-15T04:30:00"])
             file.write_text("camera,session,date\na,1,14.3.2026\n")
             self.assertRaisesRegex(ValueError, "archive.csv:2: date: should be as", dates.read_archive_table, Path(folder))
+            for wrong in ("1970-01-01", "2999-01-01"):
+                file.write_text(f"camera,session,date\na,1,{wrong}\n")
+                self.assertRaisesRegex(ValueError, f"archive.csv:2: date: {wrong} is before 2000 or in the", dates.read_archive_table, Path(folder))
 
     def test_names_faults_of_table(self):
         with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stderr(io.StringIO()) as said:
@@ -135,6 +138,9 @@ class Dates(unittest.TestCase):
             self.assertEqual(([line["files"] for line in lines], missing), (["boards 20, check 12"], ["a/7"]))
             file.write_text("camera,session,files\na,1,many\n")
             self.assertRaisesRegex(ValueError, "archive.csv:2: files: should be as", dates.read_archive_table, Path(folder))
+            for typo in ('"boards 20, chekc 12"', "check: 12"):
+                file.write_text(f"camera,session,files\na,1,{typo}\n")
+                self.assertRaisesRegex(ValueError, "files: 'che.*' is no input; these are: board.yaml, ", dates.read_archive_table, Path(folder))
 
 
 if __name__ == "__main__":

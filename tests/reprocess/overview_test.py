@@ -37,11 +37,6 @@ def items_of(**items):
 
 
 class Overview(unittest.TestCase):
-    def test_equal_results_are_the_same(self):
-        row = {"camera": "c", "session": "1", "mean_mm": "1"}
-        page = overview.list_largest_differences({"archive": "/", "bin": "/"}, Path("/"), [(row, row, 0.0)])
-        self.assertIn("the same", page)
-
     def test_begins_with_verdict_and_most_urgent_action(self):
         rows = [row("1", "review", "1"), row("2", "no result", reason="rotation: is missing"), row("3", "gate", "9")]
         items = items_of(vanished=["c/9"], lost_results=["c/2"], cameras_changed=["c: focal"], lamps_moved=["lamp 2"])

@@ -66,6 +66,22 @@ class Plan(unittest.TestCase):
             self.assertEqual(plan.list_pending_shards(state, summary_file), (list("012345"), ["4"]))
             write("summary.csv", 30)
             self.assertEqual(plan.list_pending_shards(state, summary_file), (list("12345"), ["4", "5"]))
+            self.assertEqual(plan.list_pending_shards(state, summary_file, {0: ["c/s"]})[1], ["0", "4", "5"])
+
+    def test_finds_results_that_were_changed_or_lost(self):
+        with tempfile.TemporaryDirectory() as folder:
+            names, results = [f"c/{i}" for i in range(5)], Path(folder)
+            for i, name in enumerate(names[1:], 1):
+                file = results / ("failed" if i == 1 else "sessions") / name / "row.json"
+                file.parent.mkdir(parents=True)
+                file.write_text("row" if i != 3 else "")
+                os.utime(file, (10, 30 if i == 4 else 10))
+                os.utime(file.parent, (10, 10))
+            self.assertEqual(plan.find_changed_results(results, {7: names}), {}, "rows of no run")
+            (results / ".state/rows").mkdir(parents=True)
+            (results / ".state/rows/000007.csv").touch()
+            os.utime(results / ".state/rows/000007.csv", (20, 20))
+            self.assertEqual(plan.find_changed_results(results, {7: names}), {7: ["c/0", "c/3", "c/4"]})
 
 
 if __name__ == "__main__":

@@ -54,6 +54,8 @@ class Plausibility(unittest.TestCase):
         self.assertEqual(sorted(found), ["c0/2", "c3/2"])
         self.assertRegex(found["c0/2"], r"^boards: of c2\? .* px from the nearest session of c0, 0 px from c2/1$")
         self.assertRegex(found["c3/2"], r"^rotation: of c6\? .*; dispersion_mm is 59")
+        rows[7]["remarks"] = "lens: 1 image skipped; the first, 0.png: is dark; check: lamp 4 hangs 30 mm from its place; check: more"
+        self.assertRegex(suspects(rows)["c3/2"], "; check: lamp 4 hangs 30 mm from its place; dispersion_mm")
 
     def test_names_copies_and_lost_inputs(self):
         rows = fleet(3)
@@ -63,6 +65,27 @@ class Plausibility(unittest.TestCase):
         self.assertEqual(found["c2/1"], "is a copy of c0/1")
         self.assertEqual(found["c0/2"], "check has 6 of 12 files; dispersion has 0 of 8 files")
         self.assertEqual(len(found), 2)
+
+    def test_names_copies_of_a_folder_and_exchanged_sessions(self):
+        rows = fleet(3)
+        rows[1]["copyable"] = '{"boards": "1", "check": "2"}'
+        rows[4]["copyable"] = '{"boards": "3", "check": "2"}'
+        rows[2]["former_inputs"] = rows[5]["inputs"]
+        expected = {"c2/1": "check: the same files as in c0/2", "c2/2": "has the inputs that c1/1 had: renamed or exchanged?"}
+        self.assertEqual(suspects(rows), expected)
+
+    def test_names_inputs_and_metrics_that_almost_all_others_have(self):
+        rows = fleet(10)
+        for row in rows:
+            row["files"] = "boards 22, check 15, dispersion 9"
+        rows[1]["files"] = "boards 22, check 15"
+        rows[2] |= {"files": "boards 20", "verdict": "no result"}
+        rows[5]["height_rms_mm"] = ""
+        self.assertEqual(suspects(rows), {"c0/2": "dispersion has 0 of 9 files", "c2/2": "height_rms_mm is not known"})
+        for row in rows[6:12:2]:  # some have none: it is usual
+            row |= {"files": "boards 22, check 15", "height_rms_mm": ""}
+        self.assertEqual(suspects(rows), {})
+        self.assertEqual(suspects(fleet(3)[:5] + [fleet(3)[5] | {"height_rms_mm": ""}]), {}, "too few")
 
 
 if __name__ == "__main__":

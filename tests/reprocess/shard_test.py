@@ -89,8 +89,40 @@ class Shard(unittest.TestCase):
             self.assertEqual(reprocess(s1="a", s2="d"), (["2"], ["2"]))
             (Path("sessions/c/1/row.json")).unlink()
             self.assertEqual(reprocess(s1="a", s2="d"), (["1"], ["1"]))
+            row = Path("sessions/c/1/row.json")
+            row.write_text(row.read_text().replace('"pass"', '"gate"'))
+            self.assertEqual(reprocess(s1="a", s2="d"), (["1"], ["1"]), "changed by hand")
+            self.assertEqual(json.loads(row.read_text())["verdict"], "pass")
+            self.assertFalse(Path("former").exists(), "a changed result is no former one")
             run["toolbox"] = "u"
             self.assertEqual(reprocess(s1="a", s2="d"), (["1", "2"], ["1", "2"]))
+
+    def test_reads_no_row_if_a_file_of_the_result_was_changed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            (Path("work") / "c/s").mkdir(parents=True)
+            (Path("work") / "c/s/calibration.yaml").write_text("whole\n")
+            shard.publish({"camera": "c", "session": "s", "verdict": "pass", "key": "k"}, Path("work"))
+            place = Path("sessions/c/s")
+            self.assertEqual(shard.read_row(place)["key"], "k")
+            (place / "calibration.yaml").unlink()
+            self.assertIsNone(shard.read_row(place))
+            (place / "calibration.yaml").write_text("who")
+            self.assertIsNone(shard.read_row(place))
+            (place / "calibration.yaml").write_text("whole\n")
+            self.assertEqual(shard.read_row(place)["key"], "k")
+
+    def test_keeps_last_other_inputs(self):
+        with tempfile.TemporaryDirectory() as folder:
+            self.addCleanup(os.chdir, os.getcwd())
+            os.chdir(folder)
+            place = Path("sessions/c/s")
+            place.mkdir(parents=True)
+            for inputs, former in (("a", ""), ("a", ""), ("b", "a"), ("b", "a"), ("a", "b")):
+                found = shard.expect_inputs("c/s", inputs, {"check": 2})
+                self.assertEqual(found, {"files": "check 2", "expected": "check 2", "former_inputs": former})
+                (place / "row.json").write_text(json.dumps(found | {"inputs": inputs}))
 
     def test_restarts_program_that_died(self):
         with tempfile.TemporaryDirectory() as folder:

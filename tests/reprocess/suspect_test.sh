@@ -19,6 +19,15 @@ expect() {  # EXIT-CODE WORDS OPTION...: of a run
 expect 0 '^no result   0'
 cp "$results/overview.html" "$results-page"
 
+# A result that a full disk cut, and one that is lost, are made again. The reader of stdout has ended.
+: >"$results/sessions/camera-00001/session-01/calibration.yaml"
+rm -r "$results/sessions/camera-00002/session-01"
+expect 0 'missing or changed results: camera-00001/session-01; camera-00002/session-01$'
+grep -q 'ran 2, of them 0' "$said" && [ -s "$results/sessions/camera-00001/session-01/calibration.yaml" ] || fail "$(cat "$said")"
+cmp "$results/overview.html" "$results-page" || fail "another page"
+reprocess "$results" --shard-size 2 --cores 2 2>"$said.errors" | head -n 1 >"$said"
+[ ! -s "$said.errors" ] && grep -q 'checked all files$' "$said" || fail "$(cat "$said" "$said.errors")"
+
 # Entries that are no cameras or sessions are named in one list, and the others run; so are files and sessions that
 # archive.csv expects.
 mkdir -p "$archive/.hidden" "$archive/empty" "$archive/camera-00001/"{-dash,$'line\nbreak'}
@@ -47,7 +56,7 @@ cp -r "$archive/camera-00005/session-02" "$archive/camera-00005/session-03"
 rm "$archive/camera-00002/session-02/check/0000.png"
 ln -s nowhere.png "$archive/camera-00002/session-02/check/0000.png"
 expect 1 'gate suspect: is 5, at most 0 is allowed'
-for words in 'camera-00004/session-01: boards: of camera-00002? ' 'camera-00002/session-01: check has 0 of [0-9]* files' \
+for words in 'camera-00004/session-01: boards: the same files as in camera-00002/session-02; boards: of camera-00002? ' 'camera-00002/session-01: check has 0 of [0-9]* files' \
   'camera-00001/session-01: check has [0-9]* of [0-9]* files' 'camera-00005/session-03: is a copy of camera-00005/session-02' \
   'check/truth.csv:2: x_m: the values agree with the fixes if they are in mm'; do
   grep -q "$words" "$said" "$said.errors" || fail "no '$words' in $(cat "$said" "$said.errors")"
