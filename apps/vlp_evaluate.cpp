@@ -115,6 +115,13 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
   if (!options.junit.empty() && gates.empty() && options.compare.empty()) {
     throw std::invalid_argument("--junit: there are no gates; add --gate, --gates or --compare");
   }
+  if (std::error_code unknown;
+      !options.compare.empty() &&
+      std::filesystem::equivalent(options.fixes, options.compare, unknown)) {
+    throw std::invalid_argument(
+        "--compare: is the file of the fixes itself; give those of another "
+        "version, such as accepted ones");
+  }
   if (options.noise_px == 0 && options.report.file.empty() && !options.lamps.empty()) {
     throw std::invalid_argument(
         "--lamps: no effect without --noise-px or --report; add one of them");
@@ -143,7 +150,10 @@ EvaluationInput read_input(const Options& options) {
     input.line_m = {Eigen::Vector2d{line_m[0], line_m[1]}, Eigen::Vector2d{line_m[2], line_m[3]}};
   }
   input.reference_point_radius_m = compute_reference_point_radius_m(options);
-  if (!options.compare.empty()) input.other_fixes = {options.compare, read_fixes(options.compare)};
+  if (!options.compare.empty()) {
+    input.other_fixes = {options.compare, read_fixes(options.compare)};
+    check_accepted_fixes(options.compare);
+  }
   if (options.noise_px > 0) {
     input.crlb_input = {read_overhead_lamps_of_room(options.lamps, options.room),
                         read_calibration(options.calibration).camera, options.noise_px};

@@ -3,10 +3,14 @@
 
 #include "evaluation/evaluation.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <functional>
 
+#include "evaluation/errors/systematic_errors.h"
 #include "geometry/angles.h"
+#include "rig/input_error.h"
 
 namespace vlp {
 namespace {
@@ -33,10 +37,37 @@ std::optional<SignedErrorStatistics> compute_signed_statistics(
   return compute_signed_error_statistics(std::move(values));
 }
 
+/// Returns the largest of the normalized errors of x and y, height and yaw; 0 if they are unknown.
+double compute_largest_normalized_error(const std::vector<FixRow>& fixes,
+                                        const std::vector<FixError>& errors) {
+  const auto ratios = compute_normalized_errors(fixes, errors);
+  if (!ratios) return 0;
+  return std::max({ratios->horizontal, ratios->height.value_or(0), ratios->yaw.value_or(0)});
+}
+
+/// Throws InputError if the fixes to compare with have no fix, or cannot be of these captures.
+void check_other_fixes(const EvaluationInput& input, const std::vector<FixError>& errors,
+                       const std::vector<FixError>& other_errors) {
+  const FileRows<FixRow>& others = *input.other_fixes;
+  if (other_errors.empty()) {
+    throw InputError(others.file, "none of its rows has a fix: is it of these captures?");
+  }
+  if (!input.truth) return;
+  constexpr double min_error = 20, min_ratio = 10;
+  const double error = compute_largest_normalized_error(input.fixes.rows, errors);
+  const double other_error = compute_largest_normalized_error(others.rows, other_errors);
+  if (other_error < std::max(min_error, min_ratio * error)) return;
+  throw InputError(others.file, fmt::format("its errors are {:.3g} times the reported sd, those of "
+                                            "the fixes {:.3g} times: is it of these captures, in "
+                                            "the same units? If the fixes are right, accept them",
+                                            other_error, error));
+}
+
 void add_comparison(Evaluation& evaluation, const EvaluationInput& input,
                     const std::vector<FixError>& errors) {
   if (!input.truth) check_same_images_in_fixes(input.fixes, *input.other_fixes);
   const FixErrors others = compute_fix_errors(input, *input.other_fixes);
+  check_other_fixes(input, errors, others.errors);
   evaluation.comparison = compare_fix_errors(input.fixes.rows, errors, input.other_fixes->rows,
                                              others.errors, input.threads);
 }
@@ -65,6 +96,7 @@ Evaluation evaluate_fix_accuracy(const EvaluationInput& input) {
     evaluation.bias_and_repeatability = compute_bias_and_repeatability(errors, input.truth->rows);
     evaluation.resampling_unit =
         evaluation.bias_and_repeatability ? "reference points" : "captures";
+    evaluation.systematic_errors = describe_systematic_errors(input.fixes, *input.truth, errors);
     evaluation.normalized_errors = compute_normalized_errors(input.fixes.rows, errors);
   }
   if (input.truth && input.crlb_input) {
@@ -97,6 +129,7 @@ std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
   if (const auto& ratios = evaluation.normalized_errors) {
     add("normalized_error_rms", ratios->horizontal);
     if (ratios->height) add("normalized_height_error_rms", *ratios->height);
+    if (ratios->yaw) add("normalized_yaw_error_rms", *ratios->yaw);
   }
   if (evaluation.crlb_ratio) add("crlb_ratio", evaluation.crlb_ratio->horizontal);
   if (const auto& fit = evaluation.line_fit) {

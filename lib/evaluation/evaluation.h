@@ -64,6 +64,8 @@ struct Evaluation {
   std::optional<BiasAndRepeatability> bias_and_repeatability;
   /// Only with a commanded line, if the fixes determine a direction.
   std::optional<LineFit> line_fit;
+  /// Only with a ground truth: describe_systematic_errors().
+  std::vector<std::string> systematic_errors;
   /// Only with a ground truth.
   std::optional<NormalizedErrors> normalized_errors;
   std::optional<CrlbRatio> crlb_ratio;

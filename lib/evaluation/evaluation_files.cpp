@@ -6,8 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "captures/digest.h"
 #include "evaluation/gate.h"
 #include "geometry/angles.h"
+#include "rig/file.h"
+#include "rig/input_error.h"
 
 namespace vlp {
 namespace {
@@ -173,6 +176,17 @@ std::string format_evaluation_json(const Evaluation& evaluation,
   json["gates"] = to_json(gates);
   json["passed"] = std::none_of(gates.begin(), gates.end(), is_gate_failed);
   return json.dump(2) + "\n";
+}
+
+void check_accepted_fixes(const std::filesystem::path& fixes) {
+  constexpr std::size_t max_bytes = 1 << 16;
+  const std::filesystem::path origin = fixes.string() + ".origin";
+  if (!std::filesystem::exists(origin)) return;
+  const std::string wanted = "sha256 " + compute_file_sha256(fixes) + "\n";
+  if (read_text_file(origin, max_bytes).find(wanted) != std::string::npos) return;
+  throw InputError(fixes, "was changed after it was accepted, according to " +
+                              origin.filename().string() +
+                              "; restore it, or accept fixes with accept-fixes.sh");
 }
 
 }  // namespace vlp

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -29,5 +30,10 @@ namespace vlp {
 ///   passed        true if all gates are passed
 std::string format_evaluation_json(const Evaluation& evaluation,
                                    const std::vector<CheckedMetric>& gates);
+
+/// Checks that accepted fixes are unchanged since scripts/ci/accept-fixes.sh recorded their digest
+/// in FIXES.origin, if there is such a file.
+/// @throws InputError if the digest differs or is missing
+void check_accepted_fixes(const std::filesystem::path& fixes);
 
 }  // namespace vlp

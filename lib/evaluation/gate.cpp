@@ -33,6 +33,9 @@ std::string describe_invalid_limit(const MetricKind& kind, double limit) {
   constexpr int digits = 6;
   const std::string text = format_significant_digits(limit, digits);
   if (limit < 0) return "should not be negative, as no metric is below zero: " + text;
+  if (limit == 0 && kind.direction == Direction::at_least) {
+    return "should be above 0, which is always met";
+  }
   if (limit <= kind.max_limit) return "";
   if (kind.max_limit > 1) {
     return "should be at most " + with_unit(kind.max_limit, kind.unit) + ", not " + text;

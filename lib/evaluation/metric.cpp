@@ -141,9 +141,11 @@ constexpr auto kMetricKinds = std::to_array<MetricKind>({
      "captures have no fix", at_most, 1},
     {"normalized_error_rms", "", evaluation,
      "RMS of horizontal errors / reported sd; needs ground truth and sd columns",
-     "the fixes report too small standard deviations"},
+     "the errors are larger than the fixes report: a wrong table, lens or map?"},
     {"normalized_height_error_rms", "", evaluation, "the same for the height",
      "the heights are wrong: the lens, or its boards, of another camera?"},
+    {"normalized_yaw_error_rms", "", evaluation, "the same for the yaw",
+     "the yaw angles are wrong: is the ground truth of these captures?"},
     {"warnings", "", evaluation, "number of warnings; 0: each warning fails (--strict)",
      "there are warnings", at_most, kMaxLimit, false},
     {"crlb_ratio", "", reference,
@@ -171,9 +173,9 @@ constexpr auto kMetricKinds = std::to_array<MetricKind>({
      "mean",
      "the reported standard deviations are too small, compared with --compare"},
     {"unpaired_fraction", "", reference,
-     "fraction of the captures that are not compared: a fix or its sd is only in --compare, or "
-     "--compare has no row",
-     "fixes were lost, or --compare is not of all captures", at_most, 1},
+     "fraction of the captures that are not compared: a fix is only in --compare, its sd only in "
+     "one of both, or --compare has no row",
+     "fixes were lost, or --compare lacks captures or columns", at_most, 1},
 });
 
 }  // namespace

@@ -42,6 +42,8 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
     result.warnings.push_back(std::move(warning));
   }
   if (!result.caution.empty()) result.warnings.push_back(result.caution);
+  result.warnings.insert(result.warnings.end(), evaluation.systematic_errors.begin(),
+                         evaluation.systematic_errors.end());
   if (const auto& comparison = evaluation.comparison;
       comparison && comparison->horizontal().has_too_few_clusters()) {
     // [GATE-2] `a change from chance`

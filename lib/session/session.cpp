@@ -730,6 +730,10 @@ std::vector<Gate> make_default_step_gates(const std::vector<Metric>& metrics) {
   if (exceeds_reference_error("height_rms_mm")) {
     gates.push_back({"normalized_height_error_rms", 10});
   }
+  constexpr double max_yaw_error_deg = 5;  // of a heading that is set by hand
+  if (find_metric_value(metrics, "yaw_rms_deg").value_or(max_yaw_error_deg) >= max_yaw_error_deg) {
+    gates.push_back({"normalized_yaw_error_rms", 10});
+  }
   std::erase_if(gates, [&](const Gate& gate) { return !find_metric_value(metrics, gate.metric); });
   return gates;
 }

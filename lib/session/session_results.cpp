@@ -140,7 +140,7 @@ void write_refusal_junit_xml(const fs::path& results, const fs::path& session,
                              const std::string& message) try {
   const bool is_free = !fs::exists(results) || (fs::is_directory(results) && fs::is_empty(results));
   if (results.empty() || !(is_free || fs::exists(owner_mark_file(results)))) return;
-  const SessionResults locked(results, session);
+  const SessionResults locked(results, is_free ? session : fs::path());
   const JUnitTest test{"session", JUnitTest::Result::error, message,
                        std::string(step_failure_name(StepFailure::bad_input))};
   write_file(locked.results_file_path("junit.xml"),

@@ -19,8 +19,8 @@ struct StepOutputs {
 };
 
 /// Writes junit.xml with an error in place of that of an earlier run, for a run that is refused
-/// before its first step. Leaves a folder unchanged that is in use, or that holds no results of
-/// this session; of any session, if its name is empty.
+/// before its first step, also in the results of another session, which CI would read as those of
+/// this run. Leaves a folder unchanged that is in use, or that holds no results of a session.
 void write_refusal_junit_xml(const std::filesystem::path& results,
                              const std::filesystem::path& session, const std::string& message);
 

@@ -11,6 +11,7 @@ refuse() { echo "accept-fixes.sh: error: $1" >&2; exit 2; }
 fixes=$1/check-fixes.csv
 [ -f "$fixes" ] || refuse "$fixes: is missing; run vlp-calibrate on a session with check/"
 grep -q '"verdict": "pass"' "$1/session.json" || refuse "$1/session.json: the session did not pass; correct it first"
+[ ! "$fixes" -nt "$1/session.json" ] || refuse "$fixes: was changed after the run; run vlp-calibrate again"
 cp -- "$fixes" "$2"
 awk '/"name": "mtf50"/ { getline; printf "format: vlp-gates/1\ngates: {mtf50: %.4f}\n", 0.85 * $2; exit }' \
   "$1/session.json" >"$2.gates.yaml"

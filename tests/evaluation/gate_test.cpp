@@ -189,6 +189,7 @@ TEST(ParseGate, RejectsLimitOutsideRangeAndFormerOrUnknownMetric) {
             "gate 'coverage' should be a fraction from 0 to 1, not 7: for 7 % say 0.07");
   EXPECT_EQ(words("yaw_rms_deg=200"), "gate 'yaw_rms_deg' should be at most 180 deg, not 200");
   EXPECT_THAT(words("mean_mm=-1"), HasSubstr("gate 'mean_mm' should not be negative"));
+  EXPECT_EQ(words("mtf50=0"), "gate 'mtf50' should be above 0, which is always met");
   EXPECT_EQ(words("missing=0"), "gate 'missing' is now called 'missing_fraction'");
   EXPECT_THAT(words("mising=0"), HasSubstr("gate 'mising' is not known"));
   EXPECT_EQ(parse_gate("missing_fraction=1", known).limit, 1);

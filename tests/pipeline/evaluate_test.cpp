@@ -4,6 +4,7 @@
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 
+#include "captures/digest.h"
 #include "support/program.h"
 #include "support/schema.h"
 #include "support/temporary_folder.h"
@@ -184,8 +185,10 @@ TEST_F(VlpEvaluate, CompareOptionReportsBetterSameOrWorseRun) {
               AllOf(HasSubstr("compared    horizontal error better by more than 0.0025 mm: mean "
                               "differs by -0.150 mm"),
                     HasSubstr("20 in both: 20 with a smaller error")));
-  EXPECT_THAT(with_truth("--compare fixes.csv --json same.json").output,
+  folder.file("same.csv", good);
+  EXPECT_THAT(with_truth("--compare same.csv --json same.json").output,
               HasSubstr("equivalent within 0.001 mm"));
+  EXPECT_THAT(with_truth("--compare fixes.csv").errors, HasSubstr("is the file of the fixes"));
   // All errors are significantly larger by 0.17 um, which is negligible.
   std::string hardly = good;
   for (auto at = hardly.find(".0001,"); at != std::string::npos; at = hardly.find(".0001,", at)) {
@@ -242,6 +245,17 @@ TEST_F(VlpEvaluate, CompareOptionFailsForWorseHeightYawOrSdAndForLostRows) {
   expect_red(compare(lost, accepted), "unpaired_fraction is 0.02381");
   EXPECT_EQ(compare(accepted, lost).exit_code, 0) << "a fix more";
   EXPECT_EQ(compare(lost, accepted, "--gate unpaired_fraction=0.1").exit_code, 0);
+  // Fixes to compare with that cannot be accepted ones of these captures.
+  const auto expect_refused = [&](const std::string& baseline, const std::string& words) {
+    EXPECT_EQ(compare(accepted, baseline).exit_code, 2) << words;
+    EXPECT_THAT(content("c.xml"), AllOf(HasSubstr("errors=\"1\""), HasSubstr(words)));
+  };
+  expect_refused(make_fixes(0, 0.06, 0, 0.001), "baseline.csv: its errors are 60 times the rep");
+  expect_refused(make_fixes(42, 0, 0, 0.001) + "0,too_few_lamps,,,,,,,,,1,\n",
+                 "baseline.csv: none of its rows has a fix");
+  folder.file("baseline.csv.origin", "commit none\nsha256 " + compute_text_sha256(accepted) + "\n");
+  EXPECT_EQ(compare(accepted, accepted).exit_code, 0);
+  expect_refused(make_fixes(0, 0.001, 0, 0.001), "baseline.csv: was changed after it was accepted");
 }
 
 TEST_F(VlpEvaluate, SchemaRejectsChangedEvaluationJson) {

@@ -68,7 +68,7 @@ TEST(EvaluateFixesAgainstTruth, WarnsIfErrorsAreBelowTheoreticalLimit) {
 }
 
 TEST(EvaluateFixesAgainstTruth, WarnsIfTruthDoesNotDetermineTheoreticalLimit) {
-  EvaluationInput input = make_evaluation_input(12, 1e-2);
+  EvaluationInput input = make_evaluation_input(12, 1e-3);
   const auto missing = HasSubstr("no theoretical limit: the ground truth has no z_m and yaw_rad");
   EXPECT_THAT(evaluate_fixes_against_truth(input, {}).warnings, IsEmpty()) << "was not asked";
   input.crlb_input = EvaluationInput::CrlbInput{synthetic_lamps(), synthetic_camera(), 0.1};

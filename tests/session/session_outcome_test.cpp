@@ -50,6 +50,16 @@ TEST_F(RunCalibrationSession, ChecksDefaultGatesOfEachStepForGivenCamera) {
   EXPECT_THAT(list_gates(run().gates), ElementsAre("!normalized_error_rms"));
 }
 
+TEST(MakeDefaultStepGates, LimitsYawErrorsAboveFiveDegrees) {
+  const auto gates =
+      make_default_step_gates({{"yaw_rms_deg", 4.9}, {"normalized_yaw_error_rms", 99}});
+  EXPECT_THAT(gates, IsEmpty()) << "a heading that is set by hand";
+  const auto found =
+      make_default_step_gates({{"yaw_rms_deg", 5.1}, {"normalized_yaw_error_rms", 99}});
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].metric, "normalized_yaw_error_rms");
+}
+
 TEST_F(RunCalibrationSession, StrictFailsForEachWarning) {
   options.camera_id = "another";  // than that of camera.yaml, which warns
   EXPECT_EQ(run().verdict, Verdict::pass);

@@ -83,12 +83,19 @@ TEST_F(SessionResultsTest, KeepsOutputsOfLastRunUntilThoseOfThisRunArePublished)
   EXPECT_FALSE(fs::exists(results / "steps/new"));
 }
 
-TEST_F(SessionResultsTest, WriteRefusalJunitXmlLeavesResultsOfOtherSessions) {
+TEST_F(SessionResultsTest, WriteRefusalJunitXmlReplacesThatOfAnySession) {
   { const SessionResults taken(results, session); }
-  write_refusal_junit_xml(results, folder / "another", "refused");
-  EXPECT_FALSE(fs::exists(results / "junit.xml"));
+  const std::string owner = TemporaryFolder::read_content(results / "steps/session");
+  for (const fs::path& other : {folder / "another", session, fs::path()}) {
+    const std::string words = "refused " + other.string();
+    write_refusal_junit_xml(results, other, words);
+    EXPECT_THAT(TemporaryFolder::read_content(results / "junit.xml"), HasSubstr(words));
+  }
+  EXPECT_EQ(TemporaryFolder::read_content(results / "steps/session"), owner);
+  fs::remove_all(results);
+  fs::create_directories(results / "boards");
   write_refusal_junit_xml(results, session, "refused");
-  EXPECT_THAT(TemporaryFolder::read_content(results / "junit.xml"), HasSubstr("refused"));
+  EXPECT_FALSE(fs::exists(results / "junit.xml")) << "no results";
 }
 
 TEST_F(SessionResultsTest, PublishOutputsRemovesOutputsOfStepsNotPlanned) {

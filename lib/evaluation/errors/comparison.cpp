@@ -94,12 +94,12 @@ QuantityComparison compare_quantity(const ComparedQuantity& quantity,
   return comparison;
 }
 
-/// Returns true if a quantity is known in the other fix only.
+/// Returns true if a quantity is known in one of the fixes only.
 bool is_quantity_lost(const ErrorPair& pair, const std::vector<FixRow>& fixes,
                       const std::vector<FixRow>& other_fixes) {
   return std::ranges::any_of(kComparedQuantities, [&](const ComparedQuantity& quantity) {
-    return quantity.compute(other_fixes[pair.other->fix], *pair.other) &&
-           !quantity.compute(fixes[pair.error->fix], *pair.error);
+    return quantity.compute(other_fixes[pair.other->fix], *pair.other).has_value() !=
+           quantity.compute(fixes[pair.error->fix], *pair.error).has_value();
   });
 }
 

@@ -76,8 +76,8 @@ struct QuantityComparison {
 struct Comparison {
   /// Number of captures with a fix in both, in the first only, in the second only.
   std::size_t pairs = 0, only_in_fixes = 0, only_in_other_fixes = 0;
-  /// Number of captures that escape the comparison: with a fix or a quantity in the second only, or
-  /// without a row there.
+  /// Number of captures that escape the comparison: with a fix in the second only, with a quantity
+  /// in one of both only, or without a row in the second.
   std::size_t unpaired = 0;
   /// Comparisons in the order of list_compared_quantities(); without pairs if a quantity is
   /// unknown.

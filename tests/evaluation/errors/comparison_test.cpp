@@ -162,6 +162,9 @@ TEST(CompareFixErrors, CountsCapturesThatEscapeComparison) {
   ASSERT_EQ(unpaired(), 0U);
   all.others.back().fix->sd = Eigen::Vector4d::Ones();
   EXPECT_EQ(unpaired(), 1U) << "without a standard deviation";
+  std::swap(all.fixes.back().fix->sd, all.others.back().fix->sd);
+  EXPECT_EQ(unpaired(), 1U) << "the others lack it";
+  std::swap(all.fixes.back().fix->sd, all.others.back().fix->sd);
   all.others.pop_back();
   all.other_errors.erase(all.other_errors.begin());  // index of the last row
   EXPECT_EQ(unpaired(), 1U) << "no row";
