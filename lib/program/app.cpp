@@ -278,6 +278,9 @@ int parse_arguments_and_run(CLI::App& app, int argc, char** argv, const std::fun
   } catch (const Undetermined& error) {
     spdlog::error("{}", error.what());
     return check_stdout_written(kUndetermined);
+  } catch (const std::filesystem::filesystem_error& error) {  // such as a folder without permission
+    spdlog::error("{}: {}", error.path1().string(), error.code().message());
+    return kBadInput;
   } catch (const std::exception& error) {  // includes InputError and std::invalid_argument
     spdlog::error("{}", error.what());
     return kBadInput;

@@ -628,13 +628,17 @@ class SessionRun {
     run_or_reuse_step("evaluate", inputs, format_plot_setting() + limits, [&] {
       const auto check = session_.accuracy_check_captures_folder();
       if (check) truth = find_truth_file(*check);
-      if (truth) return evaluate_check(*truth, inputs, gates);
-      Work skipped_work;
-      skipped_work.result.notes.emplace_back(
-          check
-              ? "no errors and no report: check has neither truth.csv nor positions in captures.csv"
-              : "no errors and no report: there is no check");
-      return skipped_work;
+      Work work = truth ? evaluate_check(*truth, inputs, gates) : Work();
+      if (!truth) {
+        work.result.notes.emplace_back(check
+                                           ? "no errors and no report: check has neither truth.csv "
+                                             "nor positions in captures.csv"
+                                           : "no errors and no report: there is no check");
+      }
+      if (!session_.dispersion_captures_folder()) {
+        work.result.notes.emplace_back("no dispersion offset: there is no dispersion");
+      }
+      return work;
     });
   }
 

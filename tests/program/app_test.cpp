@@ -7,6 +7,8 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <filesystem>
+#include <system_error>
 
 #include <CLI/CLI.hpp>
 
@@ -43,6 +45,14 @@ TEST(ParseArgumentsAndRun, PrintsErrorInOneLineWithoutControlCharacters) {
   EXPECT_THAT(said, HasSubstr("vlp-something: error: lamp "));
   EXPECT_EQ(said.find('\x1b'), std::string::npos);
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
+}
+
+TEST(ParseArgumentsAndRun, NamesPathThatFileSystemRefuses) {
+  const auto refused = std::make_error_code(std::errc::permission_denied);
+  const auto [code, said] = run_and_capture(
+      [&] { throw std::filesystem::filesystem_error("status", "check/captures.csv", refused); });
+  EXPECT_EQ(code, kBadInput);
+  EXPECT_THAT(said, HasSubstr("error: check/captures.csv: Permission denied"));
 }
 
 /// Returns the messages of a program with options and a command for these arguments.

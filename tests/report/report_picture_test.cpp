@@ -40,6 +40,14 @@ TEST(ReadReportPlot, CaptionsUnknownImagesWithFileName) {
             ReportPart::other);
 }
 
+TEST(RenderPlotAsSvg, PrintsNoWarningsOfGnuplot) {
+  testing::internal::CaptureStderr();
+  const std::string svg = render_plot_as_svg(
+      {"flat", 400, 300, "set size ratio -1\nset xrange [0:1]\nset yrange [0:1e-6]\nplot x\n"});
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+  EXPECT_THAT(svg, HasSubstr("<svg"));
+}
+
 /// Removes the groups without content, in which gnuplot leaves the pen of the plot before.
 std::string remove_empty_groups(const std::string& svg) {
   return std::regex_replace(svg, std::regex("<g [^>]*>\\n</g>\\n"), "");

@@ -163,6 +163,10 @@ TEST_F(RunCalibrationSession, EvaluateStatesWhyThereIsNoReport) {
               ElementsAre("lens", "rotation", "dispersion", "line-x", "evaluate"));
   EXPECT_THAT(find_step(without_check, "evaluate").result.notes,
               ElementsAre("no errors and no report: there is no check"));
+  fs::remove_all(session_file("dispersion"));
+  EXPECT_THAT(find_step(run(), "evaluate").result.notes,
+              ElementsAre("no errors and no report: there is no check",
+                          "no dispersion offset: there is no dispersion"));
   for (const char* name : {"evaluation.json", "report.html", "check-fixes.csv"}) {
     EXPECT_FALSE(has_result(name)) << name;
   }
