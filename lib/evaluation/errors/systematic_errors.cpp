@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <limits>
 #include <numbers>
 
 #include "geometry/angles.h"
@@ -103,7 +104,12 @@ Explanation fit_similarity(std::vector<Complex> truth_m, std::vector<Complex> fi
   for (std::size_t i = 0; i < truth_m.size(); ++i) {
     remaining_m.push_back(fixes_m[i] - fix_mean_m - factor * (truth_m[i] - truth_mean_m));
   }
-  return {describe_similarity(factor, is_mirrored), compute_magnitude_quantile(remaining_m)};
+  // Fixes at one place agree with any truth that is multiplied by 0.
+  for (Complex& place_m : fixes_m) place_m -= fix_mean_m;
+  const double error_m = compute_magnitude_quantile(remaining_m);
+  const bool is_explained = error_m < kMaxRemainingRatio * compute_magnitude_quantile(fixes_m);
+  return {describe_similarity(factor, is_mirrored),
+          is_explained ? error_m : std::numeric_limits<double>::infinity()};
 }
 
 /// Returns the errors against the truth of another row, `shift` rows further.

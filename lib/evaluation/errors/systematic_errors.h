@@ -18,7 +18,8 @@ namespace vlp {
 ///   heights    a common offset
 ///   yaw        a common offset, or the opposite sense of rotation and an offset
 /// Almost all: the 80 % quantile of the errors is at least 5 mm (heights 10 mm, yaw 1 degree) and
-/// falls to less than a twentieth. Returns none for fewer than six fixes.
+/// falls to less than a twentieth; with a similarity also to less than a twentieth of the spread of
+/// the fixes. Returns none for fewer than six fixes.
 std::vector<std::string> describe_systematic_errors(const FileRows<FixRow>& fixes,
                                                     const FileRows<TruthRow>& truth,
                                                     const std::vector<FixError>& errors);

@@ -92,6 +92,17 @@ TEST(DescribeSystematicErrors, NamesTurnMirrorAndScale) {
               ElementsAre(testing::ContainsRegex("multiplied by 3:")));
 }
 
+TEST(DescribeSystematicErrors, ReturnsNoneForFixesAtOnePlace) {
+  FileRows<FixRow> fixes{"fixes.csv", {}};
+  FileRows<TruthRow> truth{"truth.csv", {}};
+  for (int i = 0; i < 12; ++i) {
+    fixes.rows.push_back(fix_at(std::to_string(i), 1e-3 * (i % 3), 1e-3 * (i % 2)));
+    truth.rows.push_back({std::to_string(i), {0.3 * (i % 4), 0.25 * (i / 4)}, {}, {}});
+  }
+  const auto errors = compute_fix_errors_against_truth(fixes, truth, 1e-3).errors;
+  EXPECT_THAT(describe_systematic_errors(fixes, truth, errors), IsEmpty());
+}
+
 TEST(DescribeSystematicErrors, NamesOffsetOfHeights) {
   EXPECT_THAT(describe([](TruthRow& row) { *row.z_m += 0.1; }),
               ElementsAre(HasSubstr("z_m: the heights of the fixes differ by -100.")));
