@@ -114,10 +114,10 @@ def find_foreign_inputs(rows):
 
 
 def find_cause(row):
-    """Returns the first warning of a session, in the order of the steps, in a list; or the first skipped images."""
+    """Returns the first warning of a session, in the order of the steps, in a list; or the skipped images of a step."""
     remarks = [words for words in row.get("remarks", "").split("; ") if words]
     warnings = [words for words in remarks if "skipped" not in words and not words.startswith("the first, ")]
-    return (warnings or remarks)[:1]
+    return warnings[:1] or remarks[:2]  # "12 images skipped" and "the first, ..."
 
 
 def find_suspects(rows):

@@ -56,6 +56,8 @@ class Plausibility(unittest.TestCase):
         self.assertRegex(found["c3/2"], r"^rotation: of c6\? .*; dispersion_mm is 59")
         rows[7]["remarks"] = "lens: 1 image skipped; the first, 0.png: is dark; check: lamp 4 hangs 30 mm from its place; check: more"
         self.assertRegex(suspects(rows)["c3/2"], "; check: lamp 4 hangs 30 mm from its place; dispersion_mm")
+        rows[7]["remarks"] = "lens: 1 image skipped; the first, 0.png: is dark"
+        self.assertRegex(suspects(rows)["c3/2"], "; lens: 1 image skipped; the first, 0.png: is dark; dispersion_mm")
 
     def test_names_copies_and_lost_inputs(self):
         rows = fleet(3)
