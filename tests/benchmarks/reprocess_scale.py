@@ -98,9 +98,13 @@ def measured(what, *command):
 
 
 def write_rows(state, rows):
-    """As the shards' jobs leave them: a row for each session of a list."""
+    """As the shards' jobs leave them: a result and a row for each session of a list."""
     for file in sorted((state / "shards").glob("*.list")):
         listed = [line.split("\t") for line in file.read_text().splitlines()]
+        for line in listed:
+            place = state.parent / "sessions" / line[0]
+            place.mkdir(parents=True, exist_ok=True)
+            (place / "row.json").write_text("{}\n")  # older than its row: not changed since
         shard_rows = [rows[line[0]] | {"fingerprint": line[1]} for line in listed]
         files.write_atomically(state / "rows" / f"{file.stem}.csv", files.table(outcome.SHARD_COLUMNS, shard_rows))
         files.write_atomically(state / "costs" / file.stem, "".join(f"{line[0]}\t0.600\t1.000\n" for line in listed))
