@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <set>
+#include <span>
 
 #include "calibration/dispersion/offset_separation.h"
 #include "geometry/angles.h"
@@ -33,6 +34,12 @@ double compute_lamp_height_above_camera(const ReferencePointCapture& capture, co
   return sum_m / count;
 }
 
+bool is_rejected(const Fix& fix, int lamp) {
+  const auto count =
+      std::min(static_cast<std::size_t>(fix.rejected_lamps), fix.rejected_ids.size());
+  return std::ranges::count(std::span(fix.rejected_ids).first(count), lamp) > 0;
+}
+
 Fix locate_camera_of_capture(const Positioner& positioner, const ReferencePointCapture& capture) {
   Sensors sensors;
   sensors.inclination = capture.inclination;
@@ -51,13 +58,18 @@ Eigen::MatrixXd LampDerivatives::scale_jacobian_by_lamp_sds() const {
 
 ReferencePointFixes::ReferencePointFixes(std::span<const ReferencePointCapture> captures,
                                          const LampMap& map, const Calibration& calibration)
-    : captures_(captures),
+    : captures_(captures.begin(), captures.end()),
       map_(map),
       calibration_(remove_dispersion_from_calibration(calibration)) {
   const Positioner positioner(map_, calibration_);
-  for (const ReferencePointCapture& capture : captures_) {
+  for (ReferencePointCapture& capture : captures_) {
     const Fix fix = locate_camera_of_capture(positioner, capture);
-    if (!fix.has_succeeded() && first_failure_ == FixStatus::ok) first_failure_ = fix.status;
+    if (fix.has_succeeded()) {
+      std::erase_if(capture.detections,
+                    [&](const Detection& detection) { return is_rejected(fix, detection.lamp); });
+    } else if (first_failure_ == FixStatus::ok) {
+      first_failure_ = fix.status;
+    }
   }
 }
 
@@ -72,7 +84,9 @@ ReferencePointFixes::compute_capture_fixes_with_dispersion_offset(const Eigen::V
                                                                   const LampMap& map) const {
   Calibration calibration = calibration_;
   calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1};
-  const Positioner positioner(map, calibration);
+  PositionerOptions options;
+  options.rejects_contradicting_lamps = false;  // the constructor has rejected them
+  const Positioner positioner(map, calibration, options);
   std::vector<std::optional<Estimate>> fixes(captures_.size());
   for (std::size_t i = 0; i < captures_.size(); ++i) {
     const Fix fix = locate_camera_of_capture(positioner, captures_[i]);
@@ -111,7 +125,6 @@ LampDerivatives ReferencePointFixes::compute_fix_jacobian_wrt_lamps(
   for (Eigen::Index column = 0; column < jacobian_wrt_positions.cols(); ++column) {
     const std::size_t lamp = uncertain[static_cast<std::size_t>(column / 3)];
     double& coordinate_m = moved.lamps[lamp].position_m[column % 3];
-    // A small step, so that no lamp is rejected for it.
     constexpr double max_step_m = 1e-4;
     const double step_m = std::min(*map_.lamps[lamp].sd_m, max_step_m);
     coordinate_m += step_m;

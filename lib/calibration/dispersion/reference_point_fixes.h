@@ -31,6 +31,8 @@ class ReferencePointFixes {
     int degrees_of_freedom;
   };
 
+  /// Rejects outlier lamps of each capture. All fixes are from the others, so that they are smooth
+  /// functions of offset and map.
   ReferencePointFixes(std::span<const ReferencePointCapture> captures, const LampMap& map,
                       const Calibration& calibration);
 
@@ -48,7 +50,7 @@ class ReferencePointFixes {
   std::vector<std::optional<Estimate>> compute_capture_fixes_with_dispersion_offset(
       const Eigen::Vector2d& offset_px, const LampMap& map) const;
 
-  std::span<const ReferencePointCapture> captures_;
+  std::vector<ReferencePointCapture> captures_;
   const LampMap& map_;
   Calibration calibration_;
   FixStatus first_failure_ = FixStatus::ok;

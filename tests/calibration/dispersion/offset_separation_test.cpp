@@ -88,5 +88,26 @@ TEST(SeparateCameraAndWorldOffsets, LampDerivativesMatchOffsetsWithMovedLamps) {
   }
 }
 
+/// A lamp near the limit of rejection was rejected at one offset and used at the next one.
+TEST(SeparateCameraAndWorldOffsets, ConvergesWithLampsNearLimitOfRejection) {
+  Station station{0};
+  Random random(1);
+  int converged = 0;
+  constexpr int draws = 300;
+  constexpr double noise_px = 0.1;
+  for (int draw = 0; draw < draws; ++draw) {
+    auto captures = station.captures(6, false, {0, 0}, noise_px);
+    for (ReferencePointCapture& capture : captures) {
+      for (Detection& detection : capture.detections)
+        detection.pixel += noise_px * Eigen::Vector2d(random.normal(), random.normal());
+      capture.detections[1].pixel.x() += noise_px * random.uniform(4, 20);
+    }
+    converged += separate_camera_and_world_offsets(
+                     ReferencePointFixes(captures, station.rig.map, station.believed))
+                     .has_value();
+  }
+  EXPECT_EQ(converged, draws);
+}
+
 }  // namespace
 }  // namespace vlp
