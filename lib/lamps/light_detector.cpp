@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <iterator>
 #include <limits>
 #include <numbers>
@@ -703,7 +704,7 @@ void LightDetector::reject_lights_of_other_size(const std::optional<InverseHeigh
                                               : log_ratio > max_centroid_off;
     if (is_other) {
       reject(*light, LightReason::reflection);
-    } else if (!has_outline(*light) && light->stripes.periods < kMinReliablePeriods) {
+    } else if (!has_outline(*light) && are_even && light->stripes.periods < kMinReliablePeriods) {
       reject(*light, LightReason::too_few_periods);
     }
   }
@@ -714,32 +715,48 @@ void LightDetector::reject_misplaced_lights(const std::optional<InverseHeight>& 
   constexpr int min_lamps = 2;
   constexpr double max_off_fraction = 0.1;
   if (!inverse_height) return;
+  using Complex = std::complex<double>;
   struct Place {
     MeasuredLight* light;
-    const Lamp* lamp;
-    Eigen::Vector2d at_m;  // in the level frame
+    double size_m;
+    Complex at_m, in_map_m;  // horizontal position in the level frame, and in the map
   };
   std::vector<Place> reliable, others;
+  Complex mean_m, mean_in_map_m;
   for (MeasuredLight& light : lights) {
     const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps_.lamps, *light.lamp) : nullptr;
     const auto at = shape_.level_plane_point_from_pixel(light.pixel);
     if (!lamp || !at) continue;
     const double height_m =
         1 / inverse_height->compute_radius_in_plane(1, compute_height_beyond_first_lamp_m(*lamp));
-    auto& places = light.stripes.periods < kMinReliablePeriods ? others : reliable;
-    places.push_back({&light, lamp, height_m * *at});
+    const double size_m = lamp->shape.size_m ? lamp->shape.size_m->maxCoeff() : 0;
+    const Place place{&light, size_m, height_m * Complex(at->x(), at->y()),
+                      Complex(lamp->position_m.x(), lamp->position_m.y())};
+    if (light.stripes.periods < kMinReliablePeriods) {
+      others.push_back(place);
+    } else {
+      reliable.push_back(place);
+      mean_m += place.at_m;
+      mean_in_map_m += place.in_map_m;
+    }
   }
-  if (std::ssize(reliable) < min_lamps) return;
+  const auto count = std::ssize(reliable);
+  if (count < min_lamps) return;
+  mean_m /= double(count);
+  mean_in_map_m /= double(count);
+  Complex turn;
+  for (const Place& place : reliable)
+    turn += (place.at_m - mean_m) * std::conj(place.in_map_m - mean_in_map_m);
+  turn /= std::abs(turn);
+  const auto is_misplaced = [&](const Place& place) {
+    const Complex expected_m = turn * (place.in_map_m - mean_in_map_m);
+    const double center_error_m = has_outline(*place.light) ? 0 : place.size_m / 2;
+    return std::abs(place.at_m - mean_m - expected_m) >
+           center_error_m + max_off_fraction * (place.size_m + std::abs(expected_m));
+  };
+  if (std::ranges::any_of(reliable, is_misplaced)) return;
   for (const Place& place : others) {
-    const bool is_centroid = !has_outline(*place.light) && place.lamp->shape.size_m;
-    const double center_error_m = is_centroid ? place.lamp->shape.size_m->maxCoeff() / 2 : 0;
-    const auto contradicts = [&](const Place& other) {
-      const double expected_m = (place.lamp->position_m - other.lamp->position_m).head<2>().norm();
-      return std::abs((place.at_m - other.at_m).norm() - expected_m) >
-             center_error_m + max_off_fraction * expected_m;
-    };
-    if (2 * std::ranges::count_if(reliable, contradicts) > std::ssize(reliable))
-      reject(*place.light, LightReason::unknown_period);
+    if (is_misplaced(place)) reject(*place.light, LightReason::unknown_period);
   }
 }
 

@@ -119,8 +119,9 @@ class LightDetector {
                                         std::vector<MeasuredLight>& lights) const;
   void identify_lamps_of_lights(const std::optional<InverseHeight>& inverse_height,
                                 const ImageSize& size, std::vector<MeasuredLight>& lights) const;
-  /// Rejects lights with few periods whose distances from most lamps with more periods differ from
-  /// those of the map by more than 10 % of the distance, and the radius without an outline.
+  /// Rejects lights with few periods that are not where the lamps with more periods place their
+  /// lamp: 10 % of its size and of the distance from their mean away, or half of the size more
+  /// without an outline. Does nothing if the other lamps contradict each other.
   void reject_misplaced_lights(const std::optional<InverseHeight>& inverse_height,
                                std::vector<MeasuredLight>& lights) const;
   /// Rejects lights whose radius differs from that of their lamp, if at least three others agree.
