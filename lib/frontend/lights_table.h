@@ -41,7 +41,7 @@ std::string describe_light(const Light& light);
 
 /// Writes `lights.csv` atomically, one row per light. Columns: image, kind, reason
 /// (light_kind_name(), light_reason_name()), lamp, u_px, v_px, sigma_px, radius_px, outline (edge,
-/// rim, glow or shape), edge_rise_px, inlier_fraction, contrast, period_lines, periods,
+/// rim, rectangle or glow), edge_rise_px, inlier_fraction, contrast, period_lines, periods,
 /// periodicity_r2, coherence, duty; see Light and Stripes. Cells are empty for a light without
 /// lamp, stripes or outline.
 /// @throws InputError if the file cannot be written

@@ -182,8 +182,11 @@ MeasuredLight make_light_from_modulation(const ModulatedLight& found,
   light.radius_px = found.radius_px;
   light.rise_px = found.radius_px / 2;
   // The outline of another object, for example of a letter, does not enclose the light's center.
-  if (outline && (outline->pixel - light.pixel).norm() < outline->radius_px)
-    light = std::move(*outline);
+  const bool is_around =
+      outline && (outline->outline_kind == LightOutline::rectangle
+                      ? outline->box.contains(light.pixel)
+                      : (outline->pixel - light.pixel).norm() < outline->radius_px);
+  if (is_around) light = std::move(*outline);
   light.reason = LightReason::unknown_period;
   light.stripes = found.stripes;
   light.peak_level = found.peak_level;
@@ -265,7 +268,6 @@ LightDetector LightDetector::copy_detector_for_camera_tilt(
     camera.level_from_camera = *level_from_camera;
   } else {
     camera.lens.reset();
-    camera.max_axis_ratio = 12;  // 85 degrees off its axis
   }
   return {lamps_, camera, classifier_};
 }
@@ -349,9 +351,9 @@ std::vector<MeasuredLight> LightDetector::measure_lights(const ImageView& lines,
   return lights;
 }
 
-void LightDetector::add_steady_lights(const ImageView& lines, const std::vector<Blob>& blobs,
-                                      const Background& background,
-                                      std::vector<MeasuredLight>& lights) const {
+void LightDetector::add_remaining_blobs(const ImageView& lines, const std::vector<Blob>& blobs,
+                                        const Background& background,
+                                        std::vector<MeasuredLight>& lights) const {
   constexpr int min_px = 5, min_outline_px = 12;
   constexpr double min_clipped = 0.5;
   std::vector<MeasuredLight> added;
@@ -566,7 +568,7 @@ std::vector<Light> LightDetector::detect_lights(const ImageView& image) const {
   auto lights = measure_lights(lines, found, std::move(fits), background);
   correct_light_centers_for_motion(lines, background, lights);
   identify_lamps_of_lights(inverse_height, image.size(), lights);
-  add_steady_lights(lines, blobs, background, lights);
+  add_remaining_blobs(lines, blobs, background, lights);
   if (!shape_.has_known_lens()) add_error_of_unknown_lens(image.size(), lights);
   std::sort(lights.begin(), lights.end(), [](const Light& a, const Light& b) {
     return a.pixel.y() != b.pixel.y() ? a.pixel.y() < b.pixel.y() : a.pixel.x() < b.pixel.x();
@@ -723,6 +725,7 @@ void LightDetector::reject_misplaced_lights(const std::optional<InverseHeight>& 
   };
   std::vector<Place> reliable, others;
   Complex mean_m, mean_in_map_m;
+  const double y_sign = lamps_.lamps_below_camera ? -1 : 1;  // a camera that looks down
   for (MeasuredLight& light : lights) {
     const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps_.lamps, *light.lamp) : nullptr;
     const auto at = shape_.level_plane_point_from_pixel(light.pixel);
@@ -731,7 +734,7 @@ void LightDetector::reject_misplaced_lights(const std::optional<InverseHeight>& 
         1 / inverse_height->compute_radius_in_plane(1, compute_height_beyond_first_lamp_m(*lamp));
     const double size_m = lamp->shape.size_m ? lamp->shape.size_m->maxCoeff() : 0;
     const Place place{&light, size_m, height_m * Complex(at->x(), at->y()),
-                      Complex(lamp->position_m.x(), lamp->position_m.y())};
+                      Complex(lamp->position_m.x(), y_sign * lamp->position_m.y())};
     if (light.stripes.periods < kMinReliablePeriods) {
       others.push_back(place);
     } else {
@@ -747,6 +750,7 @@ void LightDetector::reject_misplaced_lights(const std::optional<InverseHeight>& 
   Complex turn;
   for (const Place& place : reliable)
     turn += (place.at_m - mean_m) * std::conj(place.in_map_m - mean_in_map_m);
+  if (!(std::abs(turn) > 0)) return;
   turn /= std::abs(turn);
   const auto is_misplaced = [&](const Place& place) {
     const Complex expected_m = turn * (place.in_map_m - mean_in_map_m);

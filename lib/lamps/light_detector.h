@@ -91,9 +91,10 @@ class LightDetector {
   std::vector<MeasuredLight> measure_lights(const ImageView& lines,
                                             const std::vector<ModulatedLight>& found,
                                             OutlineFits fits, const Background& background) const;
-  /// Adds the blobs in which no light was found.
-  void add_steady_lights(const ImageView& lines, const std::vector<Blob>& blobs,
-                         const Background& background, std::vector<MeasuredLight>& lights) const;
+  /// Adds the blobs in which no light was found: steady lights, and modulated ones that are not
+  /// identified.
+  void add_remaining_blobs(const ImageView& lines, const std::vector<Blob>& blobs,
+                           const Background& background, std::vector<MeasuredLight>& lights) const;
   /// Returns the lamps of modulated lights, with the centers of their outlines if known.
   std::vector<LampInPlane> find_lamps_in_plane(const std::vector<ModulatedLight>& found,
                                                const OutlineFits& fits) const;
@@ -119,9 +120,10 @@ class LightDetector {
                                         std::vector<MeasuredLight>& lights) const;
   void identify_lamps_of_lights(const std::optional<InverseHeight>& inverse_height,
                                 const ImageSize& size, std::vector<MeasuredLight>& lights) const;
-  /// Rejects lights with few periods that are not where the lamps with more periods place their
-  /// lamp: 10 % of its size and of the distance from their mean away, or half of the size more
-  /// without an outline. Does nothing if the other lamps contradict each other.
+  /// Rejects lights with few periods at a wrong position. The lights with more periods determine
+  /// rotation and translation of the map. The tolerance is 10 % of the lamp's size and of its
+  /// distance from their mean, plus half of its size without an outline. Does nothing if a light
+  /// with more periods exceeds it.
   void reject_misplaced_lights(const std::optional<InverseHeight>& inverse_height,
                                std::vector<MeasuredLight>& lights) const;
   /// Rejects lights whose radius differs from that of their lamp, if at least three others agree.

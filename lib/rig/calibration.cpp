@@ -195,10 +195,17 @@ JointCovariance read_joint_covariance(YamlMap& map, const Calibration& calibrati
       throw parameters.make_yaml_error("has the lens, and intrinsics_report has no covariance");
     lens = *report->covariance;
   }
-  read_names_if_next(list_pair_names(kZenithParameter), false);
-  read_names_if_next(list_pair_names(kLeverArmParameter), false);
+  const auto read_pair = [&](std::string_view name, bool is_known) {
+    if (read_names_if_next(list_pair_names(name), false) && !is_known) {
+      // [FILE-4] `which the calibration does not have`
+      throw parameters.make_yaml_error("has " + std::string(name) +
+                                       ", which the calibration does not have");
+    }
+  };
+  read_pair(kZenithParameter, calibration.rotation_center.has_value());
+  read_pair(kLeverArmParameter, calibration.rotation_center.has_value());
   read_names_if_next(lamp_names, true);
-  read_names_if_next(list_pair_names(kOffsetParameter), false);
+  read_pair(kOffsetParameter, calibration.dispersion.has_value());
   if (joint.parameters.size() < items.size()) {
     // [FILE-4] `is not in its place`
     throw items[joint.parameters.size()].make_yaml_error(

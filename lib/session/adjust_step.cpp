@@ -199,7 +199,7 @@ AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, History
   std::vector<JointCovariance::LampPosition> lamps;
   for (const int id : found.covariance_lamp_ids)
     lamps.push_back({id, find_lamp_by_id(map.lamps, id)->position_m});
-  Calibration calibration = input.calibration;
+  Calibration calibration = all.calibration;
   calibration.camera = found.camera;
   auto& report = calibration.intrinsics_report;
   const Eigen::MatrixXd& covariance =

@@ -20,12 +20,12 @@ import argparse
 import gc
 import shutil
 import sqlite3
+import stat
 import time
 from pathlib import Path
 
 import run_page
 from catalogue import SCANS, Catalogue
-from changes import join_items
 from checks import INCOMPLETE, check, fail, toolbox
 from dates import read_dates
 from files import digest, json_text, print_lines, table, write_if_changed, write_atomically
@@ -103,8 +103,10 @@ def write_shards(archive, sessions, state, options):
     write_if_changed(state / "shards.txt", f"{len(wanted)}\n")
     catalogue.save(shards, options.shard_size)
     changed = find_changed_results(state.parent, shards) if look == "files" else {}
-    names = join_items([name for names in changed.values() for name in names], 5)
-    return describe_scan(catalogue, look) + f"; missing or changed results: {names}" * bool(changed), missing, changed
+    names = [name for names in changed.values() for name in names]
+    more = f" and {len(names) - 5} more" * (len(names) > 5)
+    words = f"; missing or changed results: {', '.join(names[:5])}{more}" * bool(names)
+    return describe_scan(catalogue, look) + words, missing, changed
 
 
 def describe_scan(catalogue, look):
@@ -126,7 +128,8 @@ def find_changed_results(results, shards):
         for name in names if made_ns else ():
             places = [place for place in (results / "sessions" / name, results / "failed" / name) if place.is_dir()]
             found = [file.stat() for place in places for file in (place, *place.iterdir())]
-            if not found or any(one.st_mtime_ns > made_ns or one.st_size == 0 for one in found):
+            is_empty = any(one.st_size == 0 and stat.S_ISREG(one.st_mode) for one in found)
+            if not found or is_empty or any(one.st_mtime_ns > made_ns for one in found):
                 changed.setdefault(number, []).append(name)
     return changed
 

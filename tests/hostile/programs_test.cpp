@@ -249,8 +249,9 @@ INSTANTIATE_TEST_SUITE_P(
               "vlp-convert camera.yaml --to ros -o out -q && vlp-convert out -o back -q", 0, "", 5,
               300, "grep -q \"id: .it..s\" back"},
         Trial{"CovarianceBeyondAllNumbers",
-              "printf \"  covariance: [[1e308, 0], [0, 1e308]]\\n\" >c; "
-              "sed -i \"/zenith_in_camera/r c\" calibration.yaml",
+              "printf \"joint_covariance: {lamps: [], parameters: [zenith_x, zenith_y], \" "
+              ">>calibration.yaml;"
+              "printf \"rows: [[1e308], [0, 1e308]]}\\n\" >>calibration.yaml",
               kLocate, 2, "beyond 1,000,000"},
         Trial{"FormulaAsImage", "sed -i \"s/spot_00.png/=HYPERLINK(1)/\" detections.csv truth.csv",
               kLocate + "-q && vlp-evaluate fixes.csv --truth truth.csv -q", 0, "", 5, 300,

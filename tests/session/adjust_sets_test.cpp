@@ -208,6 +208,10 @@ TEST_F(RunJointAdjustmentStep, WarnsOfLensThatContradictsCaptures) {
   const AdjustStepResult right = run_joint_adjustment_step(input, {});
   ASSERT_TRUE(right.has_succeeded()) << right.message;
   EXPECT_THAT(right.warnings, Not(Contains(warning)));
+  ASSERT_TRUE(right.calibration.covariance);
+  EXPECT_TRUE(right.calibration.covariance->find_row("fx"));
+  ASSERT_TRUE(right.calibration.intrinsics_report);
+  EXPECT_TRUE(right.calibration.intrinsics_report->covariance);
   for (AdjustSet& set : input.sets) {
     for (Frame& frame : set.frames) {
       for (Detection& detection : frame.detections) {

@@ -20,7 +20,7 @@ enum class LightKind {
   truncated,    ///< identified, but cut by the image border
   unknown,      ///< modulated, but not identified as one lamp of the map, see LightReason
   unmodulated,  ///< not modulated
-  no_outline    ///< bright, but neither modulated nor with a known outline
+  no_outline    ///< modulated, but cut by the image border or too small for an outline
 };
 
 /// Reason for the class of a light: the check that rejected it as a lamp, or `identified`. The
@@ -46,8 +46,7 @@ enum class LightOutline {
   rectangle  ///< four straight edges
 };
 
-/// Light in an image. A light of kind no_outline has only a box, with `pixel` at its center; it has
-/// no stripes and no sigma.
+/// Light in an image. Without an outline `pixel` is the center of the lit area or of its box.
 struct Light {
   LightKind kind;
   LightReason reason;
@@ -112,7 +111,8 @@ inline bool has_even_outline(const Light& light) {
   return light.outline_kind == LightOutline::edge || light.outline_kind == LightOutline::rectangle;
 }
 
-/// Returns true if a light is modulated: it may be a lamp of this map or of another one.
+/// Returns true if a light is modulated and large enough: it may be a lamp of this map or of
+/// another one.
 inline bool is_light_modulated(const Light& light) {
   return light.kind != LightKind::unmodulated && light.kind != LightKind::no_outline;
 }

@@ -25,8 +25,6 @@ struct DetectorCamera {
   std::optional<Lens> lens;
   /// Rotation from the camera frame to the level frame; identity if the tilt is not calibrated.
   Eigen::Matrix3d level_from_camera = Eigen::Matrix3d::Identity();
-  /// Maximum ratio of the axes of an ellipse: that of a disc 60 degrees off its axis.
-  double max_axis_ratio = 2;
 };
 
 /// Plane in which the outlines of lights are fitted: the level plane at height 1, seen through the

@@ -28,7 +28,7 @@ constexpr float kGamma = 2.2F;
 constexpr double kMeanTone = 0.85, kToneSd = 0.2;
 /// Blur at which the fit becomes fine, and prior standard deviation of its logarithm.
 constexpr double kBlur_px = 0.9, kLogBlurSd = 0.4;
-/// Unevenness from which on an outline is a rim. The noise of a sharp image causes less.
+/// Minimum unevenness of a rim. The noise of a sharp image causes less.
 constexpr double kMinUnevenness = 0.02;
 /// Standard deviation of the area of a pixel.
 constexpr double kMinBlur_px = 0.29;
@@ -157,7 +157,8 @@ class DiscFit {
   double compute_median_level() const {
     std::vector<double> levels;
     for (const Cell& cell : cells_) {
-      if (cell.size() > 0 && cell.contrast() > min_contrast_) levels.push_back(cell.levels[kIn]);
+      if (cell.size() > 0 && cell.contrast() > min_contrast_)
+        levels.push_back(cell.levels[kIn] - background_.level);
     }
     return levels.empty() ? 0 : upper_median(std::move(levels));
   }

@@ -26,8 +26,8 @@ inline constexpr double kUnknownTiltSd = 0.06;
 /// @param blob     lit pixels of the light
 /// @param outline  result of find_blob_outline() for the blob, (column, row)
 /// @param sizes_m  lengths of both axes of the map's rectangles, used only for hidden edges
-/// @return  the light; its sigma is propagated from the eight ends of the sides, and `box_min` and
-///     `box_max` include two standard deviations of the sides
+/// @return  the light; its sigma is propagated from the eight ends of the sides, and `box` includes
+///     two standard deviations of the sides
 ///
 /// Starts from the minimum-area rectangle around the outline, aligned by line fits to its sides.
 /// Then fits each side to its edge, see fit_straight_edge(). The center is the intersection of the

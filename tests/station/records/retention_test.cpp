@@ -189,8 +189,9 @@ TEST_F(RetentionTest, CheckClockThrowsWhenNewestRunIsOverYearBeforeClock) {
   const std::string today = get_current_utc();
   keep(make_run_id(), "a", today);
   EXPECT_THAT(refusal(), HasSubstr("the runs since " + today + " ended more than a year after"));
-  keep(make_run_id(), "a", utc_days_ago(6));
-  EXPECT_THAT(refusal(), HasSubstr("the runs since " + utc_days_ago(6)));
+  const std::string six_days_ago = utc_days_ago(6);
+  keep(make_run_id(), "a", six_days_ago);
+  EXPECT_THAT(refusal(), HasSubstr("the runs since " + six_days_ago));
   keep(make_run_id(), "a", utc_days_ago(8));
   EXPECT_EQ(refusal(), "");
 }
