@@ -105,7 +105,7 @@ def write_shards(archive, sessions, state, options):
     changed = find_changed_results(state.parent, shards) if look == "files" else {}
     names = [name for names in changed.values() for name in names]
     more = f" and {len(names) - 5} more" * (len(names) > 5)
-    words = f"; missing or changed results: {', '.join(names[:5])}{more}" * bool(names)
+    words = f"; missing or changed results: {'; '.join(names[:5])}{more}" * bool(names)
     return describe_scan(catalogue, look) + words, missing, changed
 
 
