@@ -122,7 +122,7 @@ class LightDetector {
                                 const ImageSize& size, std::vector<MeasuredLight>& lights) const;
   /// Rejects lights with few periods at a wrong position. The lights with more periods determine
   /// rotation and translation of the map. The tolerance is 10 % of the lamp's size and of its
-  /// distance from their mean, plus half of its size without an outline. Does nothing if a light
+  /// distance from their mean, plus half of its size without an outline. Has no effect if a light
   /// with more periods exceeds it.
   void reject_misplaced_lights(const std::optional<InverseHeight>& inverse_height,
                                std::vector<MeasuredLight>& lights) const;

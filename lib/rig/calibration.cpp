@@ -53,6 +53,7 @@ MatrixX read_covariance(const YamlValue& value, const MatrixX& known, Eigen::Ind
   }
   // All numbers are read first, so that the matrix is not larger than the file.
   std::vector<std::vector<double>> rows;
+  rows.reserve(list.size());
   for (const YamlValue& item : list)
     rows.push_back(
         item.read_yaml_numbers(static_cast<std::size_t>(known.rows()) + rows.size() + 1));

@@ -44,7 +44,7 @@ std::array<std::string, 3> list_lamp_parameter_names(int id) {
 
 std::array<std::string, 2> list_pair_names(std::string_view first) {
   std::string second(first);
-  second[first.find("x")] = 'y';
+  second[first.find('x')] = 'y';
   return {std::string(first), second};
 }
 

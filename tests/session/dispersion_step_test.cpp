@@ -8,8 +8,8 @@
 #include <numbers>
 
 #include "rig/calibration_error.h"
-#include "support/matchers.h"
 #include "support/body_rig.h"
+#include "support/matchers.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {

@@ -157,6 +157,7 @@ std::string describe_heights(const FileRows<TruthRow>& truth, const std::vector<
   if (errors_m.size() < kMinFixes) return "";
   const double offset_m = lower_median(errors_m);
   std::vector<double> remaining_m;
+  remaining_m.reserve(errors_m.size());
   for (const double error_m : errors_m) remaining_m.push_back(std::abs(error_m - offset_m));
   if (std::abs(offset_m) < kMinHeightError_m ||
       compute_quantile(std::move(remaining_m)) >= kMaxRemainingRatio * std::abs(offset_m))
