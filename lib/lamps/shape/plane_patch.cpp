@@ -29,7 +29,7 @@ template <int Degree, int Terms>
 Eigen::Matrix<double, Terms, kNodes> make_least_squares_solver(const Nodes& nodes) {
   Eigen::Matrix<double, kNodes, Terms> values;
   for (int node = 0; node < kNodes; ++node) {
-    const Eigen::Vector2d at = nodes[std::size_t(node)];
+    const Eigen::Vector2d& at = nodes[std::size_t(node)];
     int term = 0;
     for (int i = 0; i <= Degree; ++i) {
       for (int j = 0; i + j <= Degree; ++j, ++term)

@@ -73,7 +73,7 @@ std::optional<Matrix2> compute_shape_of_blob(const Blob& blob) {
   }
   const Matrix2 covariance = squares / count - sum * sum.transpose() / (count * count);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes{Eigen::Matrix2d(covariance)};
-  const Eigen::Vector2d variances = axes.eigenvalues();
+  const Eigen::Vector2d& variances = axes.eigenvalues();
   if (!(variances[0] > 0) || variances[1] < min_axis_ratio * min_axis_ratio * variances[0])
     return std::nullopt;
   return Matrix2(axes.operatorInverseSqrt() * std::sqrt(std::sqrt(variances.prod())));

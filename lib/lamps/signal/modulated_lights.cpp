@@ -137,6 +137,7 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
                                const ModulatedRegion& region, double period_lines) {
   const double period = period_lines / cells.lines_per_bin;
   std::vector<std::complex<double>> carrier;
+  carrier.reserve(static_cast<std::size_t>(cells.bins));
   for (int bin = 0; bin < cells.bins; ++bin)
     carrier.push_back(std::polar(1.0, -2 * std::numbers::pi * (bin + 0.5) / period));
   std::complex<double> sum;

@@ -29,8 +29,9 @@ std::vector<double> integrate(const std::vector<double>& values) {
 std::vector<double> compute_moving_mean(const std::vector<double>& integrals, double length) {
   const std::size_t count = integrals.size() - 1;
   std::vector<double> means(count);
-  const auto whole = static_cast<std::size_t>(0.5 + length / 2);
-  const double fraction = 0.5 + length / 2 - double(whole);
+  const double reach = (1 + length) / 2;
+  const auto whole = static_cast<std::size_t>(reach);
+  const double fraction = reach - double(whole);
   const auto mean_at_end = [&](std::size_t i) {
     const auto integral = [&](double t) {
       const auto k = std::min(static_cast<std::size_t>(t), count - 1);
