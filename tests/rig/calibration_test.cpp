@@ -13,6 +13,7 @@
 #include "rig/calibration_error.h"
 #include "rig/calibration_text.h"
 #include "rig/samples.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {
@@ -139,9 +140,9 @@ TEST(WriteCalibration, RoundTripsCalibrationWithoutEachOptionalPart) {
       [](Calibration& c) { c.covariance.reset(); },
       [](Calibration& c) { c.rotation_center->lever_arm_m.reset(); },
       [](Calibration& c) { c.intrinsics_report.reset(); },
-      [](Calibration& c) { c.rotation_center.reset(); },
+      [](Calibration& c) { c.rotation_center.reset(), c.covariance.reset(); },
       [](Calibration& c) { c.history.clear(); },
-      [](Calibration& c) { c.dispersion.reset(); }};
+      [](Calibration& c) { c.dispersion.reset(), c.covariance.reset(); }};
   Calibration with_less_and_less = sample_calibration();
   for (const auto& remove : removals) {
     Calibration calibration = sample_calibration();
@@ -151,6 +152,15 @@ TEST(WriteCalibration, RoundTripsCalibrationWithoutEachOptionalPart) {
     remove(with_less_and_less);
     expect_kept(with_less_and_less);
   }
+}
+
+TEST(ReadCalibration, RefusesCovarianceOfMissingRotationCenter) {
+  Calibration calibration = sample_calibration();
+  calibration.rotation_center.reset();
+  const TemporaryFolder folder;
+  write_calibration(folder / "a.yaml", calibration);
+  EXPECT_THAT(rejection_message([&] { read_calibration(folder / "a.yaml"); }),
+              testing::HasSubstr("has zenith_x, which the calibration does not have"));
 }
 
 TEST(WriteCalibration, RoundTripsEachRotationModelAndReadout) {
