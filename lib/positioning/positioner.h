@@ -36,9 +36,6 @@ struct PositionerOptions {
   /// (estimate_body_state_robust). Noise, lens and an uncorrected tilt of 5 degrees cause residuals
   /// of 0.05 or less.
   double max_residual_fraction = 0.1;
-  /// Rejects lamps that contradict the others by more than noise and common errors explain. Without
-  /// it fixes are smooth functions of calibration and map.
-  bool rejects_contradicting_lamps = true;
   /// Standard deviation per axis, in the image, of detections without sigma_px. It scales the
   /// covariance and decides if lamps close together are `degenerate`. Poses do not depend on it,
   /// unless motion, inclination or height is known with a standard deviation.
@@ -47,6 +44,9 @@ struct PositionerOptions {
   /// closed forms. Errors of lens, tilt and map affect these weights less than weights in the
   /// distorted image.
   double unstated_sigma_px = 1;
+  /// Rejects lamps that contradict the others by more than noise and common errors explain. Without
+  /// it fixes are smooth functions of calibration and map.
+  bool rejects_contradicting_lamps = true;
 };
 
 /// Motion of a robot, or, without a mount, of a camera, while an image is read. Normally
