@@ -141,7 +141,7 @@ std::optional<JointCovariance> compute_joint_covariance(
     joint = make_lens_covariance(leveled);
   }
   const Eigen::Index steps = joint.first_lamp_row();
-  std::optional<MatrixX> by_steps(MatrixX(2, 0));
+  std::optional<MatrixX> jacobian_wrt_steps(MatrixX(2, 0));
   if (steps > 0) {
     MatrixX covariance = joint.matrix.topLeftCorner(steps, steps);
     for (const std::string_view parameter : {kZenithParameter, kLeverArmParameter}) {
@@ -149,14 +149,15 @@ std::optional<JointCovariance> compute_joint_covariance(
       if (const auto row = joint.find_row(parameter))
         covariance.diagonal().segment<2>(*row).array() += min_step * min_step;
     }
-    by_steps = estimate_solution_jacobian_wrt_errors(
+    jacobian_wrt_steps = estimate_solution_jacobian_wrt_errors(
         [&](const Eigen::VectorXd& errors) {
           return offset_for(add_errors(joint, leveled, errors));
         },
         fit.dispersion.offset_px.cwiseQuotient(leveled.camera.focal_px()), covariance);
   }
-  if (by_steps) {
-    return add_offset_to_covariance(std::move(joint), fit, *by_steps, leveled.camera.focal_px());
+  if (jacobian_wrt_steps) {
+    return add_offset_to_covariance(std::move(joint), fit, *jacobian_wrt_steps,
+                                    leveled.camera.focal_px());
   }
   result.warnings.emplace_back(
       "the effect of lens and zenith errors on the offset cannot be determined, and sd of fixes "

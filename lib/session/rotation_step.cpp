@@ -83,7 +83,7 @@ std::optional<JointCovariance> compute_joint_covariance(
   return joint;
 }
 
-/// Returns true if two sets of captures have the same sightings in the same order.
+/// Returns true if two sets of captures have the same observations in the same order.
 bool has_same_observations(const RotationCaptures& a, const RotationCaptures& b) {
   return a.heights.size() == b.heights.size() &&
          std::equal(a.captures.begin(), a.captures.end(), b.captures.begin(), b.captures.end(),
@@ -94,8 +94,8 @@ bool has_same_observations(const RotationCaptures& a, const RotationCaptures& b)
                     });
 }
 
-/// Computes the joint covariance from fits of the same sightings. A fit that rejects other
-/// sightings changes by more than the lens causes.
+/// Computes the joint covariance from fits of the same observations. A fit that rejects other
+/// observations changes by more than the lens causes.
 std::optional<JointCovariance> compute_joint_covariance(RotationResult& result,
                                                         const LampCaptures& input,
                                                         RotationMethod method) {

@@ -636,7 +636,8 @@ class SessionRun {
                                            : "no errors and no report: there is no check");
       }
       if (!session_.dispersion_captures_folder()) {
-        work.result.notes.emplace_back("no dispersion offset: there is no dispersion");
+        work.result.notes.emplace_back(
+            "no dispersion offset: the session has no folder dispersion");
       }
       return work;
     });

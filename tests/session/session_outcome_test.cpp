@@ -166,7 +166,7 @@ TEST_F(RunCalibrationSession, EvaluateStatesWhyThereIsNoReport) {
   fs::remove_all(session_file("dispersion"));
   EXPECT_THAT(find_step(run(), "evaluate").result.notes,
               ElementsAre("no errors and no report: there is no check",
-                          "no dispersion offset: there is no dispersion"));
+                          "no dispersion offset: the session has no folder dispersion"));
   for (const char* name : {"evaluation.json", "report.html", "check-fixes.csv"}) {
     EXPECT_FALSE(has_result(name)) << name;
   }

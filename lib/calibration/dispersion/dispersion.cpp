@@ -91,7 +91,8 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
 }  // namespace
 
 JointCovariance add_offset_to_covariance(JointCovariance joint, const DispersionFit& fit,
-                                         const MatrixX& by_steps, const Eigen::Vector2d& focal_px) {
+                                         const MatrixX& jacobian_wrt_steps,
+                                         const Eigen::Vector2d& focal_px) {
   const auto& [lamps, by_positions] = fit.lamp_derivatives;
   for (const Lamp& lamp : lamps) {
     if (joint.find_lamp_row(lamp.id, lamp.position_m)) continue;
@@ -102,7 +103,7 @@ JointCovariance add_offset_to_covariance(JointCovariance joint, const Dispersion
   }
   const Eigen::Matrix2d per_px = focal_px.cwiseInverse().asDiagonal();
   MatrixX jacobian = MatrixX::Zero(2, joint.matrix.rows());
-  jacobian.leftCols(by_steps.cols()) = by_steps;
+  jacobian.leftCols(jacobian_wrt_steps.cols()) = jacobian_wrt_steps;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     jacobian.middleCols<3>(*joint.find_lamp_row(lamps[i].id, lamps[i].position_m)) =
         per_px * by_positions.middleCols<3>(3 * static_cast<Eigen::Index>(i));

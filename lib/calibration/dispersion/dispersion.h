@@ -109,10 +109,12 @@ struct DispersionFit {
 /// Returns the joint covariance with the errors of an offset and of the lamps that affect it.
 ///
 /// @param joint     covariance of the steps before; lamps of an adjustment keep their errors
-/// @param by_steps  derivative of offset_px / f with respect to the parameters before the lamps
+/// @param jacobian_wrt_steps  derivative of offset_px / f with respect to the parameters before the
+/// lamps
 /// @pre the fit has a covariance
 JointCovariance add_offset_to_covariance(JointCovariance joint, const DispersionFit& fit,
-                                         const MatrixX& by_steps, const Eigen::Vector2d& focal_px);
+                                         const MatrixX& jacobian_wrt_steps,
+                                         const Eigen::Vector2d& focal_px);
 
 /// Estimates the dispersion: an offset in the undistorted image that makes fixes err with the yaw
 /// of the camera (lib/THEORY.md, "Dispersion circle").

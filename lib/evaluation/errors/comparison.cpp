@@ -95,8 +95,8 @@ QuantityComparison compare_quantity(const ComparedQuantity& quantity,
 }
 
 /// Returns true if a quantity is known in one of the fixes only.
-bool is_quantity_lost(const ErrorPair& pair, const std::vector<FixRow>& fixes,
-                      const std::vector<FixRow>& other_fixes) {
+bool is_quantity_in_one_only(const ErrorPair& pair, const std::vector<FixRow>& fixes,
+                             const std::vector<FixRow>& other_fixes) {
   return std::ranges::any_of(kComparedQuantities, [&](const ComparedQuantity& quantity) {
     return quantity.compute(other_fixes[pair.other->fix], *pair.other).has_value() !=
            quantity.compute(fixes[pair.error->fix], *pair.error).has_value();
@@ -161,7 +161,7 @@ Comparison compare_fix_errors(const std::vector<FixRow>& fixes, const std::vecto
       continue;
     }
     pairs.push_back({&error, errors_of_others[*other]});
-    if (is_quantity_lost(pairs.back(), fixes, other_fixes)) ++comparison.unpaired;
+    if (is_quantity_in_one_only(pairs.back(), fixes, other_fixes)) ++comparison.unpaired;
   }
   comparison.pairs = pairs.size();
   comparison.only_in_other_fixes = other_errors.size() - comparison.pairs;

@@ -19,12 +19,12 @@ namespace {
 using Complex = std::complex<double>;
 
 constexpr std::size_t kMinFixes = 6;
-/// Largest ratio of the error that remains to that before.
+/// Maximum ratio of the remaining to the original error.
 constexpr double kMaxRemainingRatio = 0.05;
-/// Smallest errors that are examined.
+/// Minimum errors that are examined.
 constexpr double kMinPositionError_m = 5e-3, kMinHeightError_m = 1e-2;
 constexpr double kMinYawError_rad = std::numbers::pi / 180;
-/// Smallest parts of a similarity that are named.
+/// Minimum error of the scale that is named.
 constexpr double kMinScaleError = 0.01;
 
 Complex to_complex(const Eigen::Vector2d& xy) { return {xy.x(), xy.y()}; }
@@ -62,7 +62,7 @@ Complex compute_median(const std::vector<Complex>& values) {
 
 /// Transformation of the positions of a truth that explains the fixes, and the error that remains.
 struct Explanation {
-  std::string words;
+  std::string description;
   double error_m;
 };
 
@@ -75,16 +75,18 @@ Explanation fit_offset(const std::vector<Complex>& errors_m) {
           compute_magnitude_quantile(remaining_m)};
 }
 
-/// Returns, for example, "mirrored and turned by 90 degrees and multiplied by 0.001".
+/// Returns, for example, "mirrored (y reversed), turned by 90 degrees, multiplied by 0.001".
 std::string describe_similarity(Complex factor, bool is_mirrored) {
   const double angle_rad = std::arg(factor), scale = std::abs(factor);
-  std::string words = is_mirrored ? "mirrored (y reversed)" : "";
-  const auto add = [&](const std::string& part) { words += (words.empty() ? "" : ", ") + part; };
+  std::string description = is_mirrored ? "mirrored (y reversed)" : "";
+  const auto add = [&](const std::string& part) {
+    description += (description.empty() ? "" : ", ") + part;
+  };
   if (std::abs(angle_rad) > kMinYawError_rad) {
     add(fmt::format("turned by {:.3g} degrees", deg_from_rad(angle_rad)));
   }
   if (std::abs(scale - 1) > kMinScaleError) add(fmt::format("multiplied by {:.3g}", scale));
-  return words.empty() ? "moved" : words;
+  return description.empty() ? "moved" : description;
 }
 
 Explanation fit_similarity(std::vector<Complex> truth_m, std::vector<Complex> fixes_m,
@@ -145,7 +147,7 @@ std::string describe_positions(const FileRows<FixRow>& fixes, const FileRows<Tru
         "{}: the positions agree with the fixes to {:.3g} mm, in place of {:.3g} mm, if they are "
         "{}: "
         "check order, axes, origin and units of its rows, and those of the lamp map",
-        truth.file.filename().string(), 1e3 * found.error_m, 1e3 * error_m, found.words);
+        truth.file.filename().string(), 1e3 * found.error_m, 1e3 * error_m, found.description);
   }
   return "";
 }

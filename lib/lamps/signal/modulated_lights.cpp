@@ -391,7 +391,8 @@ std::optional<BoxSearch> search_box_for_stripes(const ImageView& lines, const Pi
   const double shortest = *std::min_element(periods.begin(), periods.end());
   const int lines_per_bin = std::max(1, static_cast<int>(shortest / kBinsPerPeriod));
   const CellLevels cells = average_pixels_over_cells(lines, box, background.level, lines_per_bin);
-  BoxSearch result{compute_modulation_map(cells, periods), {}};
+  const bool splits_by_phase = !lamp_periods_lines.empty();
+  BoxSearch result{compute_modulation_map(cells, periods, splits_by_phase), {}};
   const double noise = std::max(min_noise, background.noise);
   const double min_amplitude = compute_min_significant_amplitude(noise, shortest);
   const auto examine = [&](ModulatedRegion region) {
@@ -407,8 +408,7 @@ std::optional<BoxSearch> search_box_for_stripes(const ImageView& lines, const Pi
   const auto is_out_of_phase = [](const RegionCandidate& candidate) {
     return candidate.phase_coherence < kMinPhaseCoherence;
   };
-  if (lamp_periods_lines.empty() || std::ranges::none_of(result.candidates, is_out_of_phase))
-    return result;
+  if (!splits_by_phase || std::ranges::none_of(result.candidates, is_out_of_phase)) return result;
   std::vector<RegionCandidate> parts;
   for (ModulatedRegion& region : find_modulated_regions(result.map, min_amplitude, true)) {
     if (region.cells < kMinCells ||

@@ -216,8 +216,8 @@ CellLevels average_pixels_over_cells(const ImageView& lines, const PixelBox& box
   return result;
 }
 
-ModulationMap compute_modulation_map(const CellLevels& cells,
-                                     std::span<const double> periods_lines) {
+ModulationMap compute_modulation_map(const CellLevels& cells, std::span<const double> periods_lines,
+                                     bool keeps_amplitudes) {
   ModulationMap map{cells.box,
                     cells.cells,
                     (cells.bins + kBinsPerStep - 1) / kBinsPerStep,
@@ -227,7 +227,8 @@ ModulationMap compute_modulation_map(const CellLevels& cells,
                     {}};
   map.amplitude.assign(map.modulation_cell_index(map.steps, 0), 0);
   map.mean.assign(map.amplitude.size(), 0);
-  map.amplitudes.resize(Eigen::Index(periods_lines.size()), Eigen::Index(map.amplitude.size()));
+  if (keeps_amplitudes)
+    map.amplitudes.resize(Eigen::Index(periods_lines.size()), Eigen::Index(map.amplitude.size()));
   // Levels times cosine, times sine, and the levels themselves, side by side.
   const Eigen::Index count = cells.cells;
   CellArray products(cells.bins, 3 * count);
@@ -245,7 +246,7 @@ ModulationMap compute_modulation_map(const CellLevels& cells,
       for (int cell = 0; cell < map.cells; ++cell) {
         const std::size_t k = map.modulation_cell_index(step, cell);
         const std::complex<float> z(2 * filtered(step, cell), 2 * filtered(step, count + cell));
-        map.amplitudes(Eigen::Index(i), Eigen::Index(k)) = z;
+        if (keeps_amplitudes) map.amplitudes(Eigen::Index(i), Eigen::Index(k)) = z;
         const float amplitude = std::sqrt(std::norm(z));
         if (amplitude <= map.amplitude[k]) continue;
         map.amplitude[k] = amplitude;

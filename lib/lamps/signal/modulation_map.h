@@ -40,7 +40,8 @@ struct ModulationMap {
   /// Largest amplitude over all periods, and the mean level around it, in gray levels, by step and
   /// cell.
   std::vector<float> amplitude, mean;
-  /// Complex amplitudes by period (row), and step and cell (column).
+  /// Complex amplitudes by period (row), and step and cell (column). They take 8 bytes for each
+  /// cell and period; empty if they are not kept.
   Eigen::ArrayXXcf amplitudes;
 
   /// Returns the middle of a step's bin, as a scanline of the image.
@@ -60,8 +61,10 @@ struct ModulationMap {
 /// constant level and all harmonics of the period, the second a linear change of the level. `mean`
 /// is the same filter without the carrier, so that amplitude / mean is the modulation depth: 4 / pi
 /// for a square wave of duty 0.5. Scanlines outside the box count as dark.
-ModulationMap compute_modulation_map(const CellLevels& cells,
-                                     std::span<const double> periods_lines);
+///
+/// @param keeps_amplitudes  true: sets ModulationMap::amplitudes
+ModulationMap compute_modulation_map(const CellLevels& cells, std::span<const double> periods_lines,
+                                     bool keeps_amplitudes);
 
 /// Returns the amplitude that noise of the dark level exceeds with the probability 1e-9 in one
 /// cell, at one period, in gray levels. The squared amplitude of white noise with the standard
@@ -90,7 +93,8 @@ struct ModulatedRegion {
 /// cells are light that the lamp casts on its surroundings, or belong to another maximum. Two
 /// maxima are merged if the saddle between them is above 60 % of the lower one.
 ///
-/// @param splits_by_phase  true: cells are only joined to a region in phase with it, at the period
+/// @param splits_by_phase  true (@pre the map has amplitudes): cells are only joined to a region in
+/// phase with it, at the period
 ///        with the largest sum of its complex amplitudes. This separates lamps that touch, and cuts
 ///        patterns into pieces.
 std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map, double min_amplitude,

@@ -80,7 +80,7 @@ std::optional<pid_t> start_gnuplot(int script, int output) {
   ::posix_spawn_file_actions_init(&actions);
   ::posix_spawn_file_actions_adddup2(&actions, script, STDIN_FILENO);
   ::posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
-  // Its warnings are about plots, and not about data.
+  // Discards warnings of gnuplot, which concern only plots.
   ::posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
   pid_t process = 0;
   const int failure = ::posix_spawnp(&process, arguments[0], &actions, nullptr, arguments.data(),

@@ -22,7 +22,8 @@ constexpr std::array kMapPeriods_lines{12.0, 16.0};
 ModulationMap make_map(const cv::Mat& image, int lines_per_bin = 1, double dark = 0) {
   const PixelBox box{0, 0, image.cols, image.rows};
   return compute_modulation_map(
-      average_pixels_over_cells(to_image_view(image), box, dark, lines_per_bin), kMapPeriods_lines);
+      average_pixels_over_cells(to_image_view(image), box, dark, lines_per_bin), kMapPeriods_lines,
+      true);
 }
 
 cv::Mat square_wave(double period_lines, double low, double high) {
@@ -80,7 +81,7 @@ TEST(ComputeMinSignificantAmplitude, NoiseExceedsFractionOfThresholdAtExpectedRa
       cells.levels.push_back(float(noise / std::sqrt(double(kCellWidth_px)) * random.normal()));
     }
     const std::array period{12.0};
-    const ModulationMap map = compute_modulation_map(cells, period);
+    const ModulationMap map = compute_modulation_map(cells, period, false);
     // Steps a window apart are independent; ends are not whole.
     for (int step = 12; step < map.steps - 12; step += 12) {
       for (int cell = 0; cell < map.cells; ++cell) {
