@@ -22,11 +22,12 @@ class VlpAdjust : public testing::Test {
  protected:
   TemporaryFolder folder;
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0, 0, 0}, 0}, {}};
+  const RotationCenter rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
   std::vector<Frame> frames;
   std::string captures = "image,pivot,x_m,y_m,z_m,reference_point,position_sd_m\n";
 
   VlpAdjust() {
-    rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.02, 1);
+    rig.calibration.rotation_center = rotation_center;
     int spot = 0;
     for (const Eigen::Vector3d& axis_m : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(0.4, 0.2, 0.2),
                                           Eigen::Vector3d(-0.4, 0.1, 0)}) {
@@ -42,6 +43,7 @@ class VlpAdjust : public testing::Test {
                     ",axis,0.0001\n";
       }
     }
+    rig.calibration.rotation_center.reset();
   }
 
   ProgramResult adjust(const std::string& options) {
@@ -49,7 +51,6 @@ class VlpAdjust : public testing::Test {
     return adjust_with_map("lamps.yaml", options);
   }
   ProgramResult adjust_with_map(const char* map, const std::string& options) {
-    rig.calibration.rotation_center.reset();
     write_calibration(folder / "camera.yaml", rig.calibration);
     write_detections(folder / "detections.csv", frames);
     folder.file("captures.csv", captures);
@@ -114,7 +115,7 @@ TEST_F(VlpAdjust, ReducesMapErrorsAndAddsCalibrationUncertaintyToFixes) {
 TEST_F(VlpAdjust, RecoversZenithAndLeverArmFromRotationWithYawRate) {
   const double rate_rad_per_s = 1;
   BodyRig body{rig.map, rolling_calibration(), {}, {}};
-  body.calibration.rotation_center = rig.calibration.rotation_center;
+  body.calibration.rotation_center = rotation_center;
   rig.calibration.camera = body.calibration.camera;
   Random random(1);
   captures = "image,pivot,yaw_rate_rad_per_s\n";
@@ -132,8 +133,7 @@ TEST_F(VlpAdjust, RecoversZenithAndLeverArmFromRotationWithYawRate) {
   const auto result = adjust("--map-sd-m 0.0001");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   const RotationCenter found = *read_calibration(folder / "adjusted.yaml").rotation_center;
-  EXPECT_LT((found.zenith_in_camera - body.calibration.rotation_center->zenith_in_camera).norm(),
-            5e-4);
+  EXPECT_LT((found.zenith_in_camera - rotation_center.zenith_in_camera).norm(), 5e-4);
   EXPECT_LT((*found.lever_arm_m - Eigen::Vector2d(0.009, 0)).norm(), 5e-4);
   EXPECT_THAT(result.errors, testing::Not(HasSubstr("times those expected from sigma_px")));
   captures = standing;
