@@ -499,10 +499,10 @@ void LightDetector::measure_stripes_in_outline(const ImageView& lines, const Bac
   if (!are_stripes_readable(stripes)) return;
   const auto lamp = identify_lamp_by_stripes(stripes);
   if (light.lamp && !(lamp && has_clear_outline(light))) return;
-  stripes.coherence =
-      light.stripes.coherence > 0
-          ? light.stripes.coherence
-          : compute_stripe_coherence_between_parts(lines, chords, background, stripes.period_lines);
+  // An object may hide a part of the outline; the box of a slanted tube may contain other lights.
+  stripes.coherence = std::max(
+      light.stripes.coherence,
+      compute_stripe_coherence_between_parts(lines, chords, background, stripes.period_lines));
   light.lamp = lamp;
   light.stripes = stripes;
   light.peak_level = *std::max_element(signal.begin(), signal.end());

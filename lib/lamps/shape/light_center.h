@@ -13,9 +13,6 @@
 
 namespace vlp {
 
-/// Minimum number of outline points on a circle or an ellipse.
-inline constexpr std::size_t kMinOutlinePoints = 10;
-
 /// Camera parameters that a light detector uses. Lights are also detected without a row time (with
 /// up to 24 dark rows between stripes), but identified then only with a classifier.
 struct DetectorCamera {

@@ -82,7 +82,8 @@ std::optional<LineLevel> LineLevels::relative_scanline_level(int line) const {
 
 LineLevel LineLevels::predict_relative_scanline_level(int line) const {
   constexpr int max_periods = 4;
-  constexpr double lamp_sd = 0.01, alone_sd = 0.05;  // repeatability of the stripes of a lamp
+  // The face may be dimmer near its edge: sd of one period away, of several, and of dark lines.
+  constexpr double alone_sd = 0.2, several_sd = 0.05, dark_sd = 0.01;
   constexpr double missed = 1.5;  // interpolation error between two lines at the edge of a stripe
   const int last = first_ + static_cast<int>(measured_.size()) - 1;
   const int sign = line < first_ ? 1 : -1;
@@ -108,11 +109,12 @@ LineLevel LineLevels::predict_relative_scanline_level(int line) const {
   }
   if (count == 0) return {0, 1};
   const double mean = sum / count;
-  const double scatter =
-      count > 1 ? std::max(0.0, squares - count * mean * mean) / (count - 1) : alone_sd * alone_sd;
+  const double scatter = count > 1 ? std::max(0.0, squares - count * mean * mean) / (count - 1)
+                                   : std::pow(alone_sd * mean, 2);
   // Vignetting changes the levels from period to period. They scatter by this change, and their
   // mean has an error of the same size. The scatter is therefore not divided by their number.
-  return {mean, std::sqrt(lamp_sd * lamp_sd + variance / count + scatter)};
+  return {mean, std::sqrt(dark_sd * dark_sd + std::pow(several_sd * mean, 2) + variance / count +
+                          scatter)};
 }
 
 }  // namespace vlp

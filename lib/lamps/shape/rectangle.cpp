@@ -17,6 +17,7 @@
 #include "geometry/polygon.h"
 #include "geometry/symmetric.h"
 #include "lamps/shape/light_center_noise.h"
+#include "lamps/shape/outline_fit.h"
 #include "lamps/shape/straight_edge.h"
 
 namespace vlp {
@@ -105,7 +106,7 @@ double compute_aspect_sd(const std::array<StraightEdge, 4>& edges, double per_px
   for (std::size_t i = 0; i < 4; ++i) {
     const StraightEdge &edge = edges[i], &opposite = edges[(i + 2) % 4];
     const double apart_px = compute_distance_from_line(edge.side, opposite.side) / per_px;
-    variance += (compute_middle_variance(edge) + square(blur_sd_fraction * edge.blur_px)) /
+    variance += (compute_middle_variance(edge) + square(blur_sd_fraction * edge.profile.blur_px)) /
                 square(apart_px);
   }
   return std::sqrt(variance);
@@ -310,7 +311,7 @@ auto get_block(EndsCovariance& ends, std::size_t edge) {
 /// tilt error makes opposite sides converge by its product with their distance, in the plane at
 /// height 1, and changes right angles by get_tilt_sd(). Returns false, without a correction, if the
 /// angles contradict, because an object may hide a part.
-bool apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
+void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
                         EndsCovariance& covariance) {
   constexpr double clear = 16;      // chi-square of three angles: one in a thousand
   constexpr double per_lean = 1.5;  // tilt error in rad over get_tilt_sd()
@@ -334,7 +335,7 @@ bool apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
   Eigen::Matrix3d spread = slope * covariance * slope.transpose();
   spread.diagonal() += sds.cwiseAbs2();
   const Eigen::LDLT<Eigen::Matrix3d> factor(spread);
-  if (!(angles.dot(factor.solve(angles)) < clear)) return false;
+  if (!(angles.dot(factor.solve(angles)) < clear)) return;
   const Eigen::Matrix<double, 8, 3> gain = factor.solve(slope * covariance).transpose();
   const Eigen::Matrix<double, 8, 1> moved_px = -gain * angles;
   covariance -= gain * slope * covariance;
@@ -343,7 +344,6 @@ bool apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
     sides[i].from += moved_px[2 * Eigen::Index(i)] * inwards;
     sides[i].to += moved_px[2 * Eigen::Index(i) + 1] * inwards;
   }
-  return true;
 }
 
 /// Computes the covariance of the image of the center, in square pixels, from that of the ends.
@@ -421,10 +421,10 @@ std::optional<MeasuredLight> fit_light(std::array<StraightEdge, 4>& edges, doubl
   for (StraightEdge& edge : edges) {
     end_sd_px = std::max(end_sd_px, std::sqrt(edge.covariance_px.diagonal().maxCoeff()));
     sagitta_px = std::max(sagitta_px, std::abs(edge.sagitta_px));
-    light.rise_px = std::max(light.rise_px, edge.points.empty() ? 0 : edge.points[0].rise_px);
+    light.rise_px = std::max(light.rise_px, kRisePerBlur * edge.profile.blur_px);
     light.inlier_fraction = std::min(light.inlier_fraction, edge.explained_fraction);
-    for (const EdgePoint& point : edge.points)
-      light.outline.push_back(shape.swap_image_and_scanline_axes(point.pixel));
+    for (const Eigen::Vector2d& point : edge.points)
+      light.outline.push_back(shape.swap_image_and_scanline_axes(point));
   }
   light.box.min().array() -= 2 * end_sd_px;
   light.box.max().array() += 2 * end_sd_px;
@@ -446,15 +446,15 @@ std::optional<MeasuredLight> fit_light(std::array<StraightEdge, 4>& edges, doubl
 /// Edges of a rectangle in the order of its sides; std::nullopt for edges that are not found.
 using FoundEdges = std::array<std::optional<StraightEdge>, 4>;
 
-/// Returns the blur of the edge with the smallest variance. @pre At least one edge exists.
-double find_most_certain_blur_px(const FoundEdges& edges) {
+/// Returns the profile of the edge with the smallest variance. @pre At least one edge exists.
+EdgeProfile find_most_certain_profile(const FoundEdges& edges) {
   const StraightEdge* surest = nullptr;
   for (const auto& edge : edges) {
     if (!edge) continue;
     if (surest == nullptr || compute_middle_variance(*edge) < compute_middle_variance(*surest))
       surest = &*edge;
   }
-  return surest->blur_px;
+  return surest->profile;
 }
 
 /// Offset of an edge's middle from its fitted position, inside positive.
@@ -495,6 +495,11 @@ std::optional<Place> predict_edge_position(const EdgeImage& image, const FoundEd
   return place;
 }
 
+/// Returns the distance of the middle between a side and the opposite one, in pixels.
+double compute_reach_px(const Sides& sides, std::size_t i, double per_px) {
+  return compute_distance_from_line(sides[i], sides[(i + 2) % 4]) / per_px / 2;
+}
+
 /// Adds hidden edges from the visible ones, see fit_rectangular_light(). Returns false if two
 /// neighboring edges are missing or a missing edge is not found.
 bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch search,
@@ -502,16 +507,10 @@ bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch sea
   constexpr double ramp_lines = 3, unknown_sd_px = 100;
   const FoundEdges visible = edges;
   search.positions = 24;
-  double min_side = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < 4; ++i) {
     if (!visible[i] && !visible[(i + 1) % 4]) return false;
-    min_side = std::min(min_side, (sides[i].to - sides[i].from).norm());
   }
-  search.blur_px = find_most_certain_blur_px(visible);
-  // The window extends to the next stripe, but not to the opposite edge.
-  search.reach_px = std::max(
-      search.reach_px,
-      std::min(image.levels.stripe_period_lines() + ramp_lines, min_side / image.per_px / 2));
+  search.profile = find_most_certain_profile(visible);
   Sides expected = sides;
   EndsCovariance ends = square(unknown_sd_px) * EndsCovariance::Identity();
   for (std::size_t i = 0; i < 4; ++i) {
@@ -519,13 +518,16 @@ bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch sea
     expected[i] = visible[i]->side;
     get_block(ends, i) = visible[i]->covariance_px;
   }
-  if (!apply_right_angles(image.shape, image.per_px, expected, ends)) return false;
+  apply_right_angles(image.shape, image.per_px, expected, ends);
   const auto corners = find_corners(expected);
   if (!corners) return false;
   expected = make_sides(*corners);
   for (std::size_t i = 0; i < 4; ++i) {
     if (visible[i]) continue;
     const Side& side = expected[i];
+    // The window extends to the next stripe, but not to the opposite edge.
+    search.reach_px = std::min(image.levels.stripe_period_lines() + ramp_lines,
+                               compute_reach_px(expected, i, image.per_px));
     const Eigen::Vector2d difference(-1, 1);
     // Twice the sd, because apply_right_angles() uses the angles again.
     const double slant_sd_px = std::sqrt(difference.dot(get_block(ends, i) * difference));
@@ -554,18 +556,18 @@ struct PlaneOutline {
 };
 
 /// Returns std::nullopt if the plane does not cover a point of the outline.
-std::optional<PlaneOutline> project_outline_to_plane(const std::vector<EdgePoint>& outline,
+std::optional<PlaneOutline> project_outline_to_plane(const std::vector<Eigen::Vector2d>& outline,
                                                      const LightShape& shape) {
   PlaneOutline result;
   result.points.reserve(outline.size());
   Eigen::AlignedBox2d in_plane, in_image;
-  for (const EdgePoint& edge : outline) {
+  for (const Eigen::Vector2d& pixel : outline) {
     const auto point =
-        shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(edge.pixel));
+        shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(pixel));
     if (!point) return std::nullopt;
     result.points.push_back(*point);
     in_plane.extend(*point);
-    in_image.extend(edge.pixel);
+    in_image.extend(pixel);
   }
   result.per_px = in_plane.diagonal().norm() / in_image.diagonal().norm();
   return result;
@@ -598,14 +600,16 @@ std::vector<PixelRun> find_chords_inside_sides(const Sides& sides, double inset,
 struct FittedRectangle {
   std::array<StraightEdge, 4> edges;
   Corners corners;
-  /// Largest curvature of an edge, and the blur of the most certain edge.
-  double sagitta_px, blur_px;
+  /// Largest curvature of an edge.
+  double sagitta_px;
+  /// Levels across the most certain edge.
+  std::optional<EdgeProfile> profile;
 };
 
 /// Returns std::nullopt if the edges do not form a rectangle.
 /// @pre all edges were found
 std::optional<FittedRectangle> assemble_rectangle(FoundEdges found) {
-  FittedRectangle result{{}, {}, 0, find_most_certain_blur_px(found)};
+  FittedRectangle result{{}, {}, 0, find_most_certain_profile(found)};
   Sides sides;
   for (std::size_t i = 0; i < 4; ++i) {
     result.edges[i] = std::move(*found[i]);
@@ -622,7 +626,7 @@ std::optional<FittedRectangle> assemble_rectangle(FoundEdges found) {
 
 std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
                                              const ImageSize& size) {
-  constexpr int min_px = 4;
+  constexpr int min_px = 2;
   double top = size.height, bottom = -1;
   for (const Eigen::Vector2d& point : polygon) {
     top = std::min(top, point.y());
@@ -648,13 +652,14 @@ std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>&
 }
 
 std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const Blob& blob,
-                                                   const std::vector<EdgePoint>& outline,
+                                                   const std::vector<Eigen::Vector2d>& outline,
                                                    const Background& background,
                                                    const LightShape& shape,
                                                    const std::vector<Eigen::Vector2d>& sizes_m) {
-  constexpr double min_px = 10, max_aspect = 40;
+  constexpr double min_px = 6, max_aspect = 40;
+  constexpr std::size_t min_points = 10;
   const PixelBox box = blob.blob_bounding_box();
-  if (outline.size() < kMinOutlinePoints || std::min(box.width, box.height) < min_px) return {};
+  if (outline.size() < min_points || std::min(box.width, box.height) < min_px) return {};
   const auto in_plane = project_outline_to_plane(outline, shape);
   if (!in_plane) return std::nullopt;
   const double per_px = in_plane->per_px;
@@ -673,7 +678,7 @@ std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const
     });
     return double(near) >= first->near * double(in_plane->points.size());
   };
-  FittedRectangle rectangle{{}, first->corners, 0, 0};
+  FittedRectangle rectangle{{}, first->corners, 0, {}};
   struct Pass {
     double inset_px;
     EdgeSearch search;
@@ -687,11 +692,12 @@ std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const
     const auto chords = find_chords_inside_sides(sides, inset, lines.size(), shape);
     if (chords.empty()) return std::nullopt;
     const LineLevels levels(lines, chords, background);
-    search.reach_px = std::min(search.reach_px + rectangle.sagitta_px, min_side / per_px / 2);
-    search.blur_px = rectangle.blur_px;
+    const double max_reach_px = search.reach_px + rectangle.sagitta_px;
+    search.profile = rectangle.profile;
     const EdgeImage image{lines, levels, background.level, per_px, shape};
     FoundEdges found_edges;
     for (std::size_t i = 0; i < 4; ++i) {
+      search.reach_px = std::min(max_reach_px, compute_reach_px(sides, i, per_px));
       found_edges[i] = fit_straight_edge(image, sides[i], search);
     }
     if (!std::ranges::all_of(found_edges, [](const auto& edge) { return edge.has_value(); })) {

@@ -45,12 +45,12 @@ inline constexpr double kUnknownTiltSd = 0.06;
 ///
 /// Returns std::nullopt in these cases:
 ///   - Four edges do not form a rectangle to 20 degrees, since an unknown tilt deforms it.
-///   - The rectangle is less than 10 px wide, has less than about 18 scanlines, or has an aspect
+///   - The rectangle is less than 6 px wide, has less than about 18 scanlines, or has an aspect
 ///     ratio above 40.
 ///   - An edge that is not hidden is outside the image or not found.
 ///   - Edges are hidden and a circle explains more of the outline.
 std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const Blob& blob,
-                                                   const std::vector<EdgePoint>& outline,
+                                                   const std::vector<Eigen::Vector2d>& outline,
                                                    const Background& background,
                                                    const LightShape& shape,
                                                    const std::vector<Eigen::Vector2d>& sizes_m);

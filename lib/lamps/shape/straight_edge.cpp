@@ -30,8 +30,19 @@ struct Sample {
 };
 
 /// Unknowns, in this order.
-enum Unknown { kFrom, kTo, kBlur, kLevelFrom, kLevelTo, kLevelBend, kOutside, kBow };
-constexpr int kUnknowns = 8;
+enum Unknown {
+  kFrom,
+  kTo,
+  kBlur,
+  kLevelFrom,
+  kLevelTo,
+  kLevelBend,
+  kInsideSlope,
+  kOutside,
+  kOutsideSlope,
+  kBow
+};
+constexpr int kUnknowns = kBow + 1;
 using Unknowns = Eigen::Matrix<double, kUnknowns, 1>;
 
 struct Model {
@@ -43,22 +54,29 @@ struct Model {
                                     double* d_residual_d_level = nullptr) const {
     const double t = sample.t, middle = 4 * t * (1 - t);
     const double move = (1 - t) * x[kFrom] + t * x[kTo] + middle * x[kBow];
-    const double depth = (sample.depth_px - sample.per_move * move) / x[kBlur];
+    const double depth_px = sample.depth_px - sample.per_move * move, depth = depth_px / x[kBlur];
     const double inside = std::erfc(-depth / std::numbers::sqrt2) / 2;
     const double density = std::exp(-depth * depth / 2) / std::sqrt(2 * std::numbers::pi);
-    const double level = (1 - t) * x[kLevelFrom] + t * x[kLevelTo] + middle * x[kLevelBend];
-    const double s = sample.lit.level, step = s * (level - x[kOutside]);
-    const double modeled = x[kOutside] + (level - x[kOutside]) * inside;
+    const double level = (1 - t) * x[kLevelFrom] + t * x[kLevelTo] + middle * x[kLevelBend] +
+                         depth_px * x[kInsideSlope];
+    const double outside = x[kOutside] + depth_px * x[kOutsideSlope];
+    const double s = sample.lit.level, step = s * (level - outside);
+    const double modeled = outside + (level - outside) * inside;
     CurveDistance<kUnknowns> result;
     result.error = sample.value - s * modeled;
-    const double d_residual_d_move = step * density / x[kBlur] * sample.per_move;
+    const double d_residual_d_move =
+        (step * density / x[kBlur] + s * (1 - inside) * x[kOutsideSlope] +
+         s * inside * x[kInsideSlope]) *
+        sample.per_move;
     result.slope[kFrom] = d_residual_d_move * (1 - t);
     result.slope[kTo] = d_residual_d_move * t;
     result.slope[kBlur] = step * density * depth / x[kBlur];
     result.slope[kLevelFrom] = -s * inside * (1 - t);
     result.slope[kLevelTo] = -s * inside * t;
     result.slope[kLevelBend] = -s * inside * middle;
+    result.slope[kInsideSlope] = -s * inside * depth_px;
     result.slope[kOutside] = -s * (1 - inside);
+    result.slope[kOutsideSlope] = depth_px * result.slope[kOutside];
     result.slope[kBow] = d_residual_d_move * middle;
     if (d_residual_d_level != nullptr) *d_residual_d_level = -modeled;
     return result;
@@ -72,12 +90,13 @@ class Samples {
           bool can_leave_image = false)
       : image_(image), side_(side), can_leave_image_(can_leave_image) {
     // A corner is blurred by both sides.
-    constexpr double corner_px = 4;
+    constexpr double max_corner_px = 4, corner_fraction = 0.25, min_length_px = 6;
     const auto from = find_pixel(0), to = find_pixel(1);
     if (!from || !to) return;
     const Eigen::Vector2d direction = *to - *from;
     length_px = direction.norm();
-    if (length_px < 3 * corner_px) return;
+    if (length_px < min_length_px) return;
+    const double corner_px = std::min(max_corner_px, corner_fraction * length_px);
     const int along = std::abs(direction.y()) >= std::abs(direction.x()) ? 1 : 0;
     const double margin = corner_px / length_px, used = 1 - 2 * margin;
     const int count = static_cast<int>(used * std::abs(direction[along]));
@@ -89,7 +108,7 @@ class Samples {
     }
     const std::size_t every = (places.size() + search.positions - 1) / search.positions;
     for (std::size_t i = 0; i < places.size(); i += every) {
-      if (add_place(places[i], 1 - along, search.reach_px)) continue;
+      if (add_place(places[i], 1 - along, search.reach_px, used / 2)) continue;
       samples.clear();
       return;
     }
@@ -121,7 +140,8 @@ class Samples {
 
   /// Adds the pixels across the side at one of its pixels. Returns false if they are outside the
   /// image or the plane.
-  bool add_place(const Eigen::Vector2d& middle, int across, double reach_px) {
+  bool add_place(const Eigen::Vector2d& middle, int across, double reach_px,
+                 double max_off_middle) {
     constexpr double apart_px = 2;
     const auto plane = [&](const Eigen::Vector2d& pixel) {
       return image_.shape.level_plane_point_from_pixel(
@@ -151,12 +171,14 @@ class Samples {
       const auto lit = image_.levels.relative_scanline_level(row);
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
+      const double t = away.dot(side_.edge_direction()) / length;
+      if (std::abs(t - 0.5) > max_off_middle) continue;
       const double fraction = image_.levels.level_at_column_relative_to_middle(column);
       samples.push_back({row,
                          {fraction * lit->level, fraction * lit->sd},
                          (image_.lines.gray_level_at_pixel(column, row) - image_.dark) /
                              image_.levels.max_level_above_dark(),
-                         away.dot(side_.edge_direction()) / length,
+                         t,
                          away.dot(inwards) / px,
                          image_.per_px / px});
     }
@@ -181,14 +203,14 @@ struct Priors {
   double bow_sd_px;
 };
 
-/// Number of priors. The level changes by 10 % in 100 px and its curvature is half of that, one
-/// standard deviation each, because the pixels of short sides do not determine it. The third one is
-/// the blur, the fourth one the curvature of the edge.
-constexpr std::size_t kNumPriors = 4;
+/// Number of priors. The level changes by 10 % in 100 px along the edge and its curvature is half
+/// of that, one standard deviation each, because the pixels of short sides do not determine it. The
+/// others are the blur, the slopes across the edge and the curvature of the edge.
+constexpr std::size_t kNumPriors = 6;
 
 CurveDistance<kUnknowns> evaluate_prior(const Model& model, std::size_t which,
                                         const Priors& priors) {
-  constexpr double change = 0.1 / 100, curvature = 0.05 / 100, blur_sd = 0.15;
+  constexpr double change = 0.1 / 100, curvature = 0.05 / 100, blur_sd = 0.15, slope_sd = 0.03;
   CurveDistance<kUnknowns> result{0, Unknowns::Zero()};
   const auto expect = [&](int unknown, double value, double sd) {
     result.error = kNoise / sd * (model.x[unknown] - value);
@@ -201,6 +223,10 @@ CurveDistance<kUnknowns> evaluate_prior(const Model& model, std::size_t which,
     expect(kLevelBend, 0, curvature * priors.length_px);
   } else if (which == 2) {
     if (priors.blur_px > 0) expect(kBlur, priors.blur_px, blur_sd * priors.blur_px);
+  } else if (which == 3) {
+    expect(kInsideSlope, 0, slope_sd);
+  } else if (which == 4) {
+    expect(kOutsideSlope, 0, slope_sd);
   } else {
     expect(kBow, 0, priors.bow_sd_px);
   }
@@ -265,7 +291,7 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
                                 const Priors& priors) {
   constexpr std::array tolerances = {5.0, 5.0, 5.0, 5.0, 2.0, 1.0, 0.5, 0.3, 0.3, 0.3};
   constexpr double first_blur_px = 1.5, sharpest_px = 0.3, softest_px = 6;
-  constexpr double max_move_px = 1.5, farthest_px = 8, min_step = 0.4, max_sd_px = 0.5;
+  constexpr double max_move_px = 1.5, farthest_px = 8, min_step = 0.2, max_sd_px = 0.5;
   constexpr double near = 3, min_lit = 0.3, explained = 0.15, min_fraction = 0.8;
   const std::vector<Sample>& samples = all.samples;
   std::vector<double> weights(samples.size() + kNumPriors, 1);
@@ -300,7 +326,8 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
   StraightEdge edge;
   edge.side = {side.from + x[kFrom] * inwards, side.to + x[kTo] * inwards};
   edge.covariance_px = *covariance;
-  edge.blur_px = x[kBlur];
+  edge.profile = {x[kBlur], (x[kLevelFrom] + x[kLevelTo]) / 2 + x[kLevelBend], x[kInsideSlope],
+                  x[kOutside], x[kOutsideSlope]};
   edge.sagitta_px = x[kBow];
   if (!(edge.covariance_px.diagonal().maxCoeff() < max_sd_px * max_sd_px)) return std::nullopt;
   int close = 0, like = 0;
@@ -317,31 +344,35 @@ std::optional<StraightEdge> fit(const Samples& all, const Side& side, double per
 /// Likelihood of the position of an edge of known blur, from the pixels near the side.
 class HiddenEdge {
  public:
-  HiddenEdge(std::vector<Sample> samples, double blur_px)
-      : samples_(std::move(samples)), blur_px_(blur_px) {
+  HiddenEdge(std::vector<Sample> samples, const EdgeProfile& profile)
+      : samples_(std::move(samples)), profile_(profile) {
     std::stable_sort(samples_.begin(), samples_.end(),
                      [](const Sample& a, const Sample& b) { return a.line < b.line; });
   }
 
   /// Returns -2 log likelihood, up to a constant, for the given distances of the ends. The level of
-  /// each scanline is the most probable one within its standard deviation.
+  /// each scanline is the most probable one within its standard deviation, relative to a common
+  /// factor near the edge, 1 within 20 %.
   double compute_cost(const Eigen::Vector2d& ends_px) const {
-    constexpr double noise = 2 * kNoise, line_sd = 0.02;  // uniform level, no light outside
-    double sum = 0;
+    constexpr double noise = 3 * kNoise, line_sd = 0.02, common_sd = 0.2;
+    double sum = 0, common_moment = 0, common_squares = 1 / (common_sd * common_sd);
     for (auto sample = samples_.begin(); sample != samples_.end();) {
       const int line = sample->line;
-      const double sd = std::hypot(sample->lit.sd, line_sd * sample->lit.level);
+      const double level = sample->lit.level, sd = std::hypot(sample->lit.sd, line_sd * level);
       double moment = 0, squares = 0;
       for (; sample != samples_.end() && sample->line == line; ++sample) {
-        const double fraction = inside(*sample, ends_px);
-        const double error = (sample->value - sample->lit.level * fraction) / noise;
+        const double fraction = compute_level(*sample, ends_px) / noise;
+        const double error = sample->value / noise - sample->lit.level * fraction;
         sum += error * error;
-        moment += error * fraction / noise;
-        squares += fraction * fraction / (noise * noise);
+        moment += error * fraction;
+        squares += fraction * fraction;
       }
-      sum -= moment * moment / (1 / (sd * sd) + squares);
+      const double gain = 1 / (1 / (sd * sd) + squares);
+      sum -= gain * moment * moment;
+      common_moment += level * moment * (1 - gain * squares);
+      common_squares += level * level * squares * (1 - gain * squares);
     }
-    return sum;
+    return sum - common_moment * common_moment / common_squares;
   }
 
   /// Returns the fraction of the pixels on lit scanlines that an edge with these ends explains.
@@ -352,23 +383,20 @@ class HiddenEdge {
       const double level = sample.lit.level;
       if (level < min_lit) continue;
       ++lit;
-      const double error = sample.value - level * inside(sample, ends_px);
+      const double error = sample.value - level * compute_level(sample, ends_px);
       like += std::abs(error) < explained * level + 2 * kNoise;
     }
     return lit > 0 ? double(like) / lit : 0;
   }
 
  private:
-  double inside(const Sample& sample, const Eigen::Vector2d& ends_px) const {
-    constexpr double clear = 4;
+  double compute_level(const Sample& sample, const Eigen::Vector2d& ends_px) const {
     const double move = (1 - sample.t) * ends_px[0] + sample.t * ends_px[1];
-    const double depth = (sample.depth_px - sample.per_move * move) / blur_px_;
-    if (std::abs(depth) > clear) return depth > 0;
-    return std::erfc(-depth / std::numbers::sqrt2) / 2;
+    return profile_.compute_level(sample.depth_px - sample.per_move * move);
   }
 
   std::vector<Sample> samples_;  // ordered by line
-  double blur_px_;
+  EdgeProfile profile_;
 };
 
 /// Mean and covariance of the distances of both ends from the side.
@@ -418,9 +446,19 @@ Ends average_edge_ends(const HiddenEdge& edge, const HiddenEdgePrior& prior, dou
 
 }  // namespace
 
+double EdgeProfile::compute_level(double depth_px) const {
+  constexpr double clear_blurs = 4, max_reach_px = 6;
+  const double depth = depth_px / blur_px,
+               within_px = std::clamp(depth_px, -max_reach_px, max_reach_px);
+  const double in = inside + inside_slope * within_px,
+               out = std::max(0.0, outside + outside_slope * within_px);
+  if (std::abs(depth) > clear_blurs) return depth > 0 ? in : out;
+  return out + (in - out) * std::erfc(-depth / std::numbers::sqrt2) / 2;
+}
+
 std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side& side,
                                               const EdgeSearch& search) {
-  constexpr double min_lit = 0.35, rise_of_blur = 1.349;
+  constexpr double min_lit = 0.35;
   constexpr std::size_t minimum = 40;
   constexpr double straight_px = 1e-4;
   const auto& [lines, levels, dark, per_px, shape] = image;
@@ -430,7 +468,8 @@ std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side
   const double focal_px = std::hypot(lines.width, lines.height) / 2;
   const double bow_sd_px =
       shape.has_known_lens() ? straight_px : length_px * length_px / (12 * focal_px);
-  auto edge = fit(all, side, per_px, {length_px, search.blur_px, bow_sd_px});
+  auto edge =
+      fit(all, side, per_px, {length_px, search.profile ? search.profile->blur_px : 0, bow_sd_px});
   if (!edge) return std::nullopt;
   const Side& found = edge->side;
   const auto points = static_cast<int>(length_px);
@@ -441,8 +480,7 @@ std::optional<StraightEdge> fit_straight_edge(const EdgeImage& image, const Side
     const Eigen::Vector2d at = shape.swap_image_and_scanline_axes(*pixel);
     const auto lit = levels.relative_scanline_level(static_cast<int>(std::lround(at.y())));
     if (!lit || lit->level < min_lit) continue;
-    edge->points.push_back(
-        {at, lit->level * levels.max_level_above_dark(), rise_of_blur * edge->blur_px, false});
+    edge->points.push_back(at);
   }
   return edge;
 }
@@ -451,16 +489,16 @@ std::optional<StraightEdge> estimate_position_of_edge_in_dark_stripe(const EdgeI
                                                                      const Side& side,
                                                                      const EdgeSearch& search,
                                                                      const HiddenEdgePrior& prior) {
-  constexpr double min_fraction = 0.8;
+  constexpr double min_fraction = 0.7;
   const Samples all(image, side, search, true);
   if (all.samples.empty()) return std::nullopt;
-  const HiddenEdge hidden(all.samples, search.blur_px);
+  const HiddenEdge hidden(all.samples, *search.profile);
   const auto [ends_px, covariance_px] = average_edge_ends(hidden, prior, search.reach_px);
   const double fraction = hidden.compute_explained_fraction(ends_px);
   if (fraction < min_fraction) return std::nullopt;
   const Eigen::Vector2d inwards = side.inward_normal() * image.per_px;
   const Side found{side.from + ends_px[0] * inwards, side.to + ends_px[1] * inwards};
-  return StraightEdge{found, covariance_px, search.blur_px, 0, fraction, {}};
+  return StraightEdge{found, covariance_px, *search.profile, 0, fraction, {}};
 }
 
 }  // namespace vlp

@@ -49,7 +49,7 @@ struct Stripes {
   /// True if the begins and ends of all stripes agree with the period.
   bool is_regular;
   /// Result of compute_stripe_coherence_between_parts(), or the phase coherence of a modulated
-  /// light; 0 if it was not measured.
+  /// light, the larger one if both are measured; 0 if none is.
   double coherence;
   /// Number of stripes per scanline: half of the number of begins and ends divided by the number of
   /// scanlines. The signal crosses the middle between dark and bright there.

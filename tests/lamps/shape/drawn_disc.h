@@ -4,19 +4,15 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "frontend/mat_view.h"
-#include "lamps/shape/outline.h"
 
 namespace vlp {
 
 constexpr double kDark = 0.04;  // fraction of white
-/// Minimum cosine between the row and the normal for which find_blob_outline() is accurate.
-constexpr double kSteep = 0.75;
 
 /// Blurred disc on a dark image of 200 x 160 pixels with a fill factor of 1. The blur includes that
 /// of the pixels: 0.3 px or more.
@@ -31,10 +27,6 @@ struct DrawnDisc {
   double chips = 0, pitch_px = 6;
 
   double off(const Eigen::Vector2d& pixel) const { return (pixel - center).norm() - radius_px; }
-  /// Returns the cosine of the angle between the row and the outline's normal.
-  double cosine(const Eigen::Vector2d& pixel) const {
-    return std::abs(pixel.x() - center.x()) / radius_px;
-  }
   cv::Mat image(int depth) const {
     constexpr int finer = 8;
     constexpr double pixels_own = 1 / 12.0;  // variance of a pixel's area
@@ -67,29 +59,5 @@ struct DrawnDisc {
     return image;
   }
 };
-
-inline std::vector<EdgePoint> outline_in(const cv::Mat& pixels) {
-  const ImageView image = to_image_view(pixels);
-  const Background background = estimate_image_background(image);
-  std::vector<EdgePoint> all;
-  for (const Blob& blob :
-       group_pixel_runs_into_blobs(find_pixel_runs(image, background.threshold), 3)) {
-    const auto points = find_blob_outline(image, blob, background);
-    all.insert(all.end(), points.begin(), points.end());
-  }
-  return all;
-}
-
-/// Returns the largest error of the points with at least this cosine between row and normal;
-/// infinity if there are none.
-inline double worst_off(const DrawnDisc& disc, const std::vector<EdgePoint>& points,
-                        double min_cosine) {
-  double worst = -1;
-  for (const EdgePoint& point : points) {
-    if (disc.cosine(point.pixel) < min_cosine) continue;
-    worst = std::max(worst, std::abs(disc.off(point.pixel)));
-  }
-  return worst < 0 ? std::numeric_limits<double>::infinity() : worst;
-}
 
 }  // namespace vlp
