@@ -456,12 +456,20 @@ std::vector<LampRadius> LightDetector::find_radii(const std::vector<ModulatedLig
 
 std::optional<KnownRadius> LightDetector::predict_radius(
     const Lamp* lamp, const std::optional<InverseHeight>& inverse_height) const {
-  if (!inverse_height || !lamp || !lamp->shape.size_m || lamp->shape.kind != ShapeKind::disc)
-    return std::nullopt;
-  const double radius = inverse_height->compute_radius_in_plane(
-      lamp->shape.size_m->x() / 2, compute_height_beyond_first_lamp_m(*lamp));
-  if (!(radius > 0) || !std::isfinite(radius)) return std::nullopt;
-  return KnownRadius{radius, inverse_height->log_sd};
+  constexpr double max_ratio = 1.15;
+  if (!inverse_height || lamps_.lamps.empty()) return std::nullopt;
+  double min_radius = std::numeric_limits<double>::infinity(), max_radius = 0;
+  for (const Lamp& one : lamp ? std::span(lamp, 1) : std::span<const Lamp>(lamps_.lamps)) {
+    if (!one.shape.size_m || one.shape.kind != ShapeKind::disc) return std::nullopt;
+    const double radius = inverse_height->compute_radius_in_plane(
+        one.shape.size_m->x() / 2, compute_height_beyond_first_lamp_m(one));
+    if (!(radius > 0) || !std::isfinite(radius)) return std::nullopt;
+    min_radius = std::min(min_radius, radius);
+    max_radius = std::max(max_radius, radius);
+  }
+  if (max_radius > max_ratio * min_radius) return std::nullopt;
+  return KnownRadius{std::sqrt(min_radius * max_radius),
+                     inverse_height->log_sd + std::log(max_radius / min_radius) / 2};
 }
 
 const Lamp* LightDetector::find_lamp_of_period(const ModulatedLight& found) const {
@@ -689,6 +697,7 @@ void LightDetector::reject_lights_of_other_size(const std::optional<InverseHeigh
   int num_agreeing = 0, num_even = 0;
   for (MeasuredLight& light : lights) {
     const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps_.lamps, *light.lamp) : nullptr;
+    if (!lamp) continue;
     const auto radius = predict_radius(lamp, inverse_height);
     const auto measured = measure_radius_in_plane(light);
     if (!radius || !measured) continue;

@@ -287,7 +287,8 @@ std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob
   constexpr int min_size = 8, min_lines = 5;
   constexpr double margin = 0.2, min_step = 0.28, min_known_step = 0.15, max_radius = 0.75,
                    max_sds = 2;
-  constexpr double min_start_blur_px = 1.5, start_blur = 0.04, max_center_sd = 0.006;
+  constexpr double min_start_blur_px = 1.5, start_blur = 0.04, max_center_sd = 0.006,
+                   max_known_center_sd = 0.01;
   const PixelBox box = blob.blob_bounding_box();
   if (std::min(box.width, box.height) < min_size) return std::nullopt;
   const Eigen::Vector2d middle(box.x + box.width / 2.0, box.y + box.height / 2.0);
@@ -337,7 +338,7 @@ std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob
   constexpr double min_core_ratio = 2;
   MeasuredLight light{};
   light.has_bright_core = fit && face.bright_level() > min_core_ratio * fit->level;
-  if (!fit || fit->center_sd_px > max_center_sd * fit->radius_px ||
+  if (!fit || fit->center_sd_px > (radius ? max_known_center_sd : max_center_sd) * fit->radius_px ||
       !set_fitted_outline(*fit, shape, light) || (radius && !radius->agrees_with(light))) {
     return std::nullopt;
   }
