@@ -138,7 +138,6 @@ int main(int argc, char** argv) {
                  "Method. camera (default): separates errors that rotate with the camera from "
                  "errors in the world; needs several yaws. chen-guan: moves the circle center to "
                  "the reference point; needs one yaw and an exact lamp map and reference point")
-      ->check(vlp::make_validator_rejecting_former_option_values())
       ->check(CLI::IsMember({"camera", "chen-guan"}))
       ->option_text("camera|chen-guan");
   app.add_option("--circle", options.circle,

@@ -121,7 +121,6 @@ CLEAR = [
     "is not valid YAML",
     "is not within",
     "is not YAML",
-    "is now called",
     "is of a ",
     "is where lamp",
     "lacks '",

@@ -95,7 +95,6 @@ while [ $# -gt 0 ]; do
       [ -e "$profile/config.yaml" ] || usage "--profile $2: no such profile, nor a folder with config.yaml"
       shift ;;
     -h | --help) sed -n '5,/^set/p' "$0" | sed '$d; s/^# \{0,1\}//'; exit ;;
-    --look | --look=*) usage "option '--look' is now called '--scan'" ;;
     -*) usage "unknown option $1" ;;
     *) folders+=("${1%/}") ;;
   esac

@@ -11,7 +11,6 @@
 
 #include "captures/csv_writer.h"
 #include "rig/file.h"
-#include "rig/renamed.h"
 #include "rig/yaml_text.h"
 
 namespace vlp {
@@ -124,13 +123,7 @@ CsvTable::Column CsvTable::get_required_column(std::string_view name) const {
 
 std::optional<CsvTable::Column> CsvTable::get_optional_column(std::string_view name) const {
   const auto found = std::find(header_.begin(), header_.end(), name);
-  if (found == header_.end()) {
-    const std::string_view former = find_former_name_for_current(NameKind::column, name);
-    if (!former.empty() && std::ranges::find(header_, former) != header_.end()) {
-      throw InputError(file_, 1, "", "column " + describe_renaming(former, name));
-    }
-    return std::nullopt;
-  }
+  if (found == header_.end()) return std::nullopt;
   return Column{static_cast<std::size_t>(found - header_.begin())};
 }
 

@@ -31,8 +31,7 @@ class CsvTable {
   struct Column {
     std::size_t index;
   };
-  /// Returns a column. Throws InputError if it is missing, or, also if it is optional, if the table
-  /// has it under its former name.
+  /// Returns a column. Throws InputError if a required one is missing.
   Column get_required_column(std::string_view name) const;
   std::optional<Column> get_optional_column(std::string_view name) const;
 

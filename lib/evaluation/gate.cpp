@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "captures/number_text.h"
-#include "rig/renamed.h"
 #include "rig/yaml_reader.h"
 
 namespace vlp {
@@ -89,8 +88,6 @@ Gate parse_gate(const std::string& text, const std::vector<MetricKind>& known) {
   const auto kind = std::find_if(known.begin(), known.end(),
                                  [&](const MetricKind& each) { return each.name == name; });
   if (kind == known.end()) {
-    const std::string_view present = find_current_name_for_former(NameKind::metric, name);
-    if (!present.empty()) throw std::invalid_argument("gate " + describe_renaming(name, present));
     throw std::invalid_argument("gate '" + name +
                                 "' is not known; the gates are: " + join_names(known));
   }

@@ -6,8 +6,6 @@
 #include <array>
 #include <cmath>
 
-#include "rig/renamed.h"
-
 namespace vlp {
 namespace {
 
@@ -197,11 +195,6 @@ std::optional<MetricKind> find_metric_kind(const std::string& name) {
   const auto kind = std::find_if(kMetricKinds.begin(), kMetricKinds.end(),
                                  [&](const MetricKind& each) { return each.name == name; });
   return kind == kMetricKinds.end() ? std::nullopt : std::optional(*kind);
-}
-
-std::string find_current_metric_name(const std::string& name) {
-  const std::string_view present = find_current_name_for_former(NameKind::metric, name);
-  return present.empty() ? name : std::string(present);
 }
 
 std::optional<double> find_metric_value(const std::vector<Metric>& metrics,

@@ -54,9 +54,6 @@ std::vector<MetricKind> list_metric_kinds(std::initializer_list<MetricSource> so
 /// Returns the metric of this unique name; std::nullopt if there is none.
 std::optional<MetricKind> find_metric_kind(const std::string& name);
 
-/// Returns the present name of a metric of a record, which may have been kept under a former one.
-std::string find_current_metric_name(const std::string& name);
-
 /// Measured metric.
 struct Metric {
   std::string name;

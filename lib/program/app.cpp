@@ -25,7 +25,6 @@
 
 #include "program/help_formatter.h"
 #include "program/reference.h"
-#include "rig/renamed.h"
 
 namespace vlp {
 namespace {
@@ -78,25 +77,11 @@ CLI::Validator make_ending_validator(const std::vector<std::string>& endings,
       "");
 }
 
-/// Returns true if the program, or the command that was given, has an option.
-bool has_option(const CLI::App& app, const std::string& name) {
-  const auto commands = app.get_subcommands();
-  return app.get_option_no_throw(name) != nullptr ||
-         std::ranges::any_of(commands, [&](const CLI::App* command) {
-           return command->get_option_no_throw(name) != nullptr;
-         });
-}
-
 /// Describes the unknown options of the command line; returns an empty string if there are none.
 std::string describe_unknown_options(const CLI::App& app) {
   std::string names;
   for (const std::string& word : app.remaining(true)) {
     if (!word.starts_with("--")) continue;
-    const std::string name = word.substr(0, word.find('='));
-    const std::string present(find_current_name_for_former(NameKind::option, name));
-    if (!present.empty() && has_option(app, present)) {
-      return "option " + describe_renaming(name, present);
-    }
     names.append(names.empty() ? "unknown: " : ", ").append(word);
   }
   return names;
@@ -163,15 +148,6 @@ CLI::Validator make_file_extension_validator(const std::string& ending) {
 
 CLI::Validator make_plot_file_validator() {
   return make_ending_validator({".png", ".svg"}, "a picture's name should end in .png or .svg");
-}
-
-CLI::Validator make_validator_rejecting_former_option_values() {
-  return CLI::Validator(
-      [](const std::string& text) {
-        const std::string_view present = find_current_name_for_former(NameKind::value, text);
-        return present.empty() ? std::string() : describe_renaming(text, present);
-      },
-      "");
 }
 
 void add_threads_option(CLI::App& app, int& threads, const std::string& description) {

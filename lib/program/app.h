@@ -40,9 +40,6 @@ CLI::Validator make_finite_validator();
 CLI::Validator make_finite_positive_validator();
 CLI::Validator make_finite_non_negative_validator();
 
-/// Returns a validator that rejects the former name of a value and names the present one.
-CLI::Validator make_validator_rejecting_former_option_values();
-
 /// Returns a validator that accepts file names with this ending.
 CLI::Validator make_file_extension_validator(const std::string& ending);
 /// Returns a validator that accepts file names of plots: .png or .svg.

@@ -12,7 +12,6 @@
 #include <yaml-cpp/eventhandler.h>
 
 #include "rig/file.h"
-#include "rig/renamed.h"
 #include "rig/yaml_text.h"
 
 namespace vlp {
@@ -152,27 +151,12 @@ std::optional<YamlValue> YamlMap::get_optional_yaml_value(const std::string& key
     const std::size_t line = is_null ? entry.line : entry.value->line;
     return YamlValue(entry.value, file_, prefix_.empty() ? key : prefix_ + "." + key, line);
   }
-  check_former_name_of_key_absent(key);
   return std::nullopt;
 }
 
 bool YamlMap::has_yaml_key(const std::string& key) const {
-  const bool found = std::any_of(entries_.begin(), entries_.end(),
-                                 [&](const Entry& entry) { return entry.key == key; });
-  if (!found) check_former_name_of_key_absent(key);
-  return found;
-}
-
-/// Throws InputError if an entry has the former name of `key`, which may be that of a metric.
-void YamlMap::check_former_name_of_key_absent(std::string_view key) const {
-  for (const NameKind kind : {NameKind::key, NameKind::metric}) {
-    const std::string_view former = find_former_name_for_current(kind, key);
-    for (const Entry& entry : entries_) {
-      if (!former.empty() && entry.key == former) {
-        throw make_yaml_error(entry.line, "key " + describe_renaming(former, key));
-      }
-    }
-  }
+  return std::any_of(entries_.begin(), entries_.end(),
+                     [&](const Entry& entry) { return entry.key == key; });
 }
 
 std::optional<double> YamlMap::get_optional_yaml_number(const std::string& key, double min,
@@ -192,7 +176,6 @@ YamlValue YamlMap::get_required_yaml_value(const std::string& key) {
 void YamlMap::check_all_yaml_keys_read() const {
   for (const Entry& entry : entries_) {
     if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
-    for (const std::string& name : known_) check_former_name_of_key_absent(name);
     std::string names;
     for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
     throw make_yaml_error(entry.line, "key " + quote_text_for_message(entry.key) +

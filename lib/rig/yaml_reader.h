@@ -81,7 +81,6 @@ class YamlMap {
  public:
   YamlMap(const YamlPart& node, const std::filesystem::path* file, std::string key);
 
-  /// The readers of keys also throw InputError if the mapping has the key under its former name.
   bool has_yaml_key(const std::string& key) const;
   YamlValue get_required_yaml_value(const std::string& key);
   std::optional<YamlValue> get_optional_yaml_value(const std::string& key);
@@ -111,7 +110,6 @@ class YamlMap {
 
  private:
   InputError make_yaml_error(std::size_t line, const std::string& problem) const;
-  void check_former_name_of_key_absent(std::string_view key) const;
 
   struct Entry {
     std::string key;

@@ -43,19 +43,6 @@ TEST(ReadCapturesCsv, ReadsReferencePointPositionSdAndPivotColumns) {
   EXPECT_TRUE(captures.at("b").pivot.empty());
 }
 
-TEST(ReadCapturesCsv, RejectsFormerColumnStatingItsPresentName) {
-  const TemporaryFolder folder;
-  const auto refusal = [&](const std::string& content) {
-    return rejection_message([&] { read_captures_csv(folder.file("c.csv", content)); });
-  };
-  EXPECT_THAT(refusal("image,spot\na,s1\n"),
-              HasSubstr("c.csv:1: column 'spot' is now called 'pivot'"));
-  EXPECT_THAT(refusal("image,x_m,y_m,place\na,1,2,axis\n"),
-              HasSubstr("c.csv:1: column 'place' is now called 'reference_point'"));
-  EXPECT_THAT(refusal("image,x_m,y_m,place_sd_m\na,1,2,0.1\n"),
-              HasSubstr("c.csv:1: column 'place_sd_m' is now called 'position_sd_m'"));
-}
-
 TEST(ReadCapturesCsv, ReadsVelocityYawRateAndVelocitySdColumns) {
   const TemporaryFolder folder;
   const auto captures = read_captures_csv(folder.file(

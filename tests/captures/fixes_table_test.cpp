@@ -101,22 +101,6 @@ TEST(ReadFixes, ReportsFileLineAndColumnOfInvalidRow) {
   EXPECT_THAT(refusal(""), HasSubstr("fixes.csv: contains no fix"));
 }
 
-TEST(ReadFixes, RejectsFormerColumnStatingItsPresentName) {
-  const TemporaryFolder folder;
-  for (const std::string axis : {"x", "y", "z", "yaw"}) {
-    const std::string unit = axis == "yaw" ? "_rad" : "_m";
-    for (const std::string statistic : {"sd", "noise_sd"}) {
-      const std::string former = statistic + "_" + axis + unit;
-      const std::string present = axis + "_" + statistic + unit;
-      const auto file = folder.file(
-          "fixes.csv", "image,status,x_m,y_m,z_m,yaw_rad," + former + "\na,ok,0,0,0,0,1\n");
-      EXPECT_THAT(
-          rejection_message([&] { read_fixes(file); }),
-          HasSubstr("fixes.csv:1: column '" + former + "' is now called '" + present + "'"));
-    }
-  }
-}
-
 TEST(WriteFixes, WritesNoiseSdsAndRejectedLampsOnlyWhenGiven) {
   const TemporaryFolder folder;
   FixRow plain{"a", "ok", FixRow::Fix{{{1, 2, 3}, 0.5}, Eigen::Vector4d(1, 1, 1, 1), 0.1}, 4};

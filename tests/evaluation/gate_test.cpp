@@ -190,7 +190,6 @@ TEST(ParseGate, RejectsLimitOutsideRangeAndFormerOrUnknownMetric) {
   EXPECT_EQ(words("yaw_rms_deg=200"), "gate 'yaw_rms_deg' should be at most 180 deg, not 200");
   EXPECT_THAT(words("mean_mm=-1"), HasSubstr("gate 'mean_mm' should not be negative"));
   EXPECT_EQ(words("mtf50=0"), "gate 'mtf50' should be above 0, which is always met");
-  EXPECT_EQ(words("missing=0"), "gate 'missing' is now called 'missing_fraction'");
   EXPECT_THAT(words("mising=0"), HasSubstr("gate 'mising' is not known"));
   EXPECT_EQ(parse_gate("missing_fraction=1", known).limit, 1);
   EXPECT_EQ(parse_gate("normalized_error_rms=50", known).limit, 50);
@@ -201,8 +200,6 @@ TEST(ParseGate, RejectsLimitOutsideRangeAndFormerOrUnknownMetric) {
   };
   EXPECT_THAT(refusal("  mean_mm: 1\n  missing_fraction: 1.5\n"),
               HasSubstr("g.yaml:4: gates.missing_fraction: should be a fraction from 0 to 1"));
-  EXPECT_THAT(refusal("  mean_mm: 1\n  missing: 0\n"),
-              HasSubstr("g.yaml:4: gates: key 'missing' is now called 'missing_fraction'"));
   EXPECT_THAT(refusal("  yaw_rms_deg: -0.5\n"),
               HasSubstr("g.yaml:3: gates.yaw_rms_deg: should not be negative"));
 }

@@ -55,40 +55,7 @@ TEST(ParseArgumentsAndRun, NamesPathThatFileSystemRefuses) {
   EXPECT_THAT(said, HasSubstr("error: check/captures.csv: Permission denied"));
 }
 
-/// Returns the messages of a program with options and a command for these arguments.
-std::string said_of(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), "vlp-something");
-  std::vector<char*> argv;
-  for (std::string& argument : arguments) argv.push_back(argument.data());
-  CLI::App app("Something", "vlp-something");
-  double sd_deg = 0;
-  std::string method, digest;
-  app.add_option("--roll-pitch-sd-deg", sd_deg);
-  app.add_option("--method", method)
-      ->check(make_validator_rejecting_former_option_values())
-      ->check(CLI::IsMember({"camera", "chen-guan"}));
-  app.add_subcommand("verify", "Verifies")->add_option("--expected-digest", digest);
-  testing::internal::CaptureStderr();
-  parse_arguments_and_run(app, static_cast<int>(argv.size()), argv.data(), [] {});
-  return testing::internal::GetCapturedStderr();
-}
-
-TEST(ParseArgumentsAndRun, NamesNewNameForRenamedOptionOrValue) {
-  const std::string problem =
-      "vlp-something: error: option '--lean-sd-deg' is now called '--roll-pitch-sd-deg'; see "
-      "vlp-something --help\n";
-  EXPECT_EQ(said_of({"--lean-sd-deg", "90"}), problem);
-  EXPECT_EQ(said_of({"--lean-sd-deg=90"}), problem);
-  EXPECT_THAT(said_of({"verify", "--noted", "0"}),
-              HasSubstr("option '--noted' is now called '--expected-digest'"));
-  EXPECT_THAT(said_of({"--method", "paper", "verify"}),
-              HasSubstr("'paper' is now called 'chen-guan'"));
-  EXPECT_THAT(said_of({"--method", "other", "verify"}), HasSubstr("chen-guan"));
-  // The program has no option with the present name.
-  EXPECT_THAT(said_of({"--frames", "2"}), HasSubstr("unknown: --frames"));
-}
-
-/// Returns the same for a program whose stdout is full.
+/// Runs a program whose stdout is full. Returns its exit code and messages.
 std::pair<int, std::string> end_with_full_stdout(const std::function<void()>& run) {
   const int kept = ::dup(STDOUT_FILENO), full = ::open("/dev/full", O_WRONLY | O_CLOEXEC);
   std::fflush(stdout);

@@ -51,7 +51,7 @@ void add_metrics(const nlohmann::json& entries, std::vector<CheckedMetric>& metr
   metrics.reserve(metrics.size() + entries.size());
   for (const nlohmann::json& entry : entries) {
     CheckedMetric metric;
-    metric.name = find_current_metric_name(entry.at("name"));
+    metric.name = entry.at("name");
     if (!names.insert(metric.name).second) continue;
     metric.unit = entry.value("unit", "");
     metric.value = find_number(entry, "value");
@@ -108,8 +108,7 @@ ReprocessedArchive read_reprocessed_archive_sessions(const fs::path& results) {
     run.run = make_session_run_id(run.ended_utc, run.station + "/" + session);
     run.program = "vlp-calibrate " + text(row, "version");
     run.config_sha256 = text(row, "key");
-    // "look" is the former name of "review".
-    const bool passed = verdict == "pass" || verdict == "review" || verdict == "look";
+    const bool passed = verdict == "pass" || verdict == "review";
     const bool failed = verdict == "gate";
     run.verdict = verdict_name(passed ? Verdict::pass : failed ? Verdict::fail : Verdict::invalid);
     if (!passed) run.causes = text(row, "reason") + "\n";

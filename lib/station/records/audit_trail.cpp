@@ -160,13 +160,6 @@ void append_run_events_to_audit_trail(soci::session& sql, const std::string& run
   }
 }
 
-void append_all_runs_to_audit_trail(soci::session& sql) {
-  for (const std::string& run : load_run_ids(sql)) {
-    append_run_events_to_audit_trail(sql, run, true,
-                                     load_run_with_all_parts(sql, run).value().events);
-  }
-}
-
 TrailCheck check_audit_trail(soci::session& sql, const std::string& expected_digest,
                              const std::function<void()>& on_progress) {
   TrailCheck check;

@@ -33,8 +33,6 @@ void lock_audit_trail(soci::session& sql);
 /// `is_new_run`.
 void append_run_events_to_audit_trail(soci::session& sql, const std::string& run, bool is_new_run,
                                       const std::vector<RunEvent>& new_events);
-/// Appends entries of all runs, for records of an earlier version without a trail.
-void append_all_runs_to_audit_trail(soci::session& sql);
 
 /// Result of check_audit_trail(): numbers of runs and entries, and differences.
 struct TrailCheck {

@@ -57,82 +57,7 @@ std::vector<std::string> list_table_statements() {
           kImagesByDigest};
 }
 
-/// Units of the metrics of version 1, which did not store them. This table never changes, even if
-/// metrics do.
-constexpr const char* kUnitsOfVersion1 =
-    "UPDATE figures SET unit = CASE "
-    "WHEN name IN ('blur_px', 'center_px', 'nominal_px', 'rms_px', 'uncertainty_px', 'halves_px', "
-    "'rotation_px', 'rotation_spread_px', 'rotation_sd_px', 'dispersion_offset_px', "
-    "'check_residual_px') THEN 'px' "
-    "WHEN name IN ('lever_arm_mm', 'dispersion_mm', 'world_mm', 'check_mean_mm', "
-    "'check_worst_mm', 'check_offset_mm', 'check_height_mm') THEN 'mm' "
-    "WHEN name = 'tilt_deg' THEN 'deg' WHEN name = 'focal_percent' THEN '%' ELSE '' END";
-
-/// Adds the units of figures.
-void migrate_tables_1_to_2(soci::session& sql) {
-  sql << "ALTER TABLE figures ADD COLUMN unit VARCHAR(16) NOT NULL DEFAULT ''";
-  sql << kUnitsOfVersion1;
-}
-
-/// Adds the index of images by their digest, and refuses older programs, which count INVALID as
-/// failed.
-void migrate_tables_2_to_3(soci::session& sql) { sql << kImagesByDigest; }
-
-/// Adds guard bands, which older programs cannot evaluate.
-void migrate_tables_3_to_4(soci::session& sql) {
-  sql << "ALTER TABLE figures ADD COLUMN uncertainty DOUBLE PRECISION";
-  sql << "ALTER TABLE figures ADD COLUMN guard_k DOUBLE PRECISION";
-}
-
-constexpr const char* kEventsOfVersion5 =
-    "CREATE TABLE IF NOT EXISTS events (event VARCHAR(64) PRIMARY KEY, "
-    "run VARCHAR(64) NOT NULL REFERENCES runs (run), what VARCHAR(32) NOT NULL, "
-    "text TEXT NOT NULL)";
-
-/// Adds events, operator and shift. An older program would store runs without their events, and
-/// remove them from the spool.
-void migrate_tables_4_to_5(soci::session& sql) {
-  sql << kEventsOfVersion5;
-  sql << kEventsByRun;
-  sql << "ALTER TABLE runs ADD COLUMN operator_name TEXT NOT NULL DEFAULT ''";
-  sql << "ALTER TABLE runs ADD COLUMN shift TEXT NOT NULL DEFAULT ''";
-}
-
-/// Adds the authors of events, and the trail. Older programs would store runs without entries in
-/// it.
-void migrate_tables_5_to_6(soci::session& sql) {
-  sql << "ALTER TABLE events ADD COLUMN who TEXT NOT NULL DEFAULT ''";
-  sql << kTrail;
-}
-constexpr int kFirstWithTrail = 6;
-
-/// Migrations from each version to the next, starting with version 1.
-constexpr std::array kMigrations{migrate_tables_1_to_2, migrate_tables_2_to_3,
-                                 migrate_tables_3_to_4, migrate_tables_4_to_5,
-                                 migrate_tables_5_to_6};
-
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
-
-/// Returns the version of the tables; 0 without tables. Throws for a later version than this
-/// program's.
-int load_table_version(soci::session& sql) {
-  // Not to_regclass(): an earlier result of a connection can be cached, and be wrong after waiting
-  // for the lock.
-  const char* const query =
-      is_sqlite(sql)
-          ? "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'vlp_schema'"
-          : "SELECT COUNT(*) FROM pg_tables WHERE tablename = 'vlp_schema' AND "
-            "schemaname = ANY (current_schemas(false))";
-  int tables_there = 0, version = 0;
-  sql << query, soci::into(tables_there);
-  if (tables_there == 0) return 0;
-  sql << "SELECT COALESCE(MAX(version), 0) FROM vlp_schema", soci::into(version);
-  if (version <= kSchemaVersion) return version;
-  throw std::runtime_error("contains records of version " + std::to_string(version) +
-                           ", this program supports versions up to " +
-                           std::to_string(kSchemaVersion) +
-                           ": use the newer vlp-station that wrote them");
-}
 
 void read_run_metrics(soci::session& sql, RunRecord& record) {
   CheckedMetric metric;
@@ -160,14 +85,25 @@ void read_run_metrics(soci::session& sql, RunRecord& record) {
 
 }  // namespace
 
-const int kSchemaVersion = static_cast<int>(kMigrations.size()) + 1;
-
-bool has_current_schema_version(soci::session& sql) {
-  // Versions only increase. Takes no lock, so that read-only users can call it.
-  return load_table_version(sql) == kSchemaVersion;
+bool has_record_tables(soci::session& sql) {
+  // Not to_regclass(): an earlier result of a connection can be cached, and be wrong after waiting
+  // for the lock.
+  const char* const query =
+      is_sqlite(sql)
+          ? "SELECT COUNT(*) FROM sqlite_master WHERE type = 'table' AND name = 'vlp_schema'"
+          : "SELECT COUNT(*) FROM pg_tables WHERE tablename = 'vlp_schema' AND "
+            "schemaname = ANY (current_schemas(false))";
+  int tables_there = 0, version = 0;
+  sql << query, soci::into(tables_there);
+  if (tables_there == 0) return false;
+  sql << "SELECT COALESCE(MAX(version), 0) FROM vlp_schema", soci::into(version);
+  if (version == kSchemaVersion) return true;
+  throw std::runtime_error("contains records of version " + std::to_string(version) +
+                           ", this program reads version " + std::to_string(kSchemaVersion) +
+                           ": use the vlp-station that wrote them");
 }
 
-void create_or_migrate_record_tables(soci::session& sql) {
+void create_record_tables(soci::session& sql) {
   soci::transaction transaction(sql);
   // Serialized: a waiting program sees the changes of the other.
   if (is_sqlite(sql)) {
@@ -179,22 +115,11 @@ void create_or_migrate_record_tables(soci::session& sql) {
     // same table.
     sql << "SELECT pg_advisory_xact_lock(" + std::to_string(kTableLockId) + ")";
   }
-  if (load_table_version(sql) == 0) {
+  if (!has_record_tables(sql)) {
     for (const std::string& table : list_table_statements()) sql << table;
     sql << "INSERT INTO vlp_schema (version) SELECT CAST(:version AS INTEGER) WHERE NOT EXISTS "
            "(SELECT 1 FROM vlp_schema)",
         soci::use(kSchemaVersion);
-  }
-  // Waits for current writers.
-  lock_audit_trail(sql);
-  const int found = load_table_version(sql);
-  for (int version = found; version < kSchemaVersion; ++version) {
-    kMigrations.at(static_cast<std::size_t>(version) - 1)(sql);
-  }
-  // Requires all columns.
-  if (found < kFirstWithTrail) append_all_runs_to_audit_trail(sql);
-  if (found < kSchemaVersion) {
-    sql << "UPDATE vlp_schema SET version = :version", soci::use(kSchemaVersion);
   }
   transaction.commit();
 }

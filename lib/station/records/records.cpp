@@ -22,7 +22,6 @@
 #include <utility>
 
 #include "rig/input_error.h"
-#include "rig/renamed.h"
 #include "station/database_name.h"
 #include "station/records/record_tables.h"
 
@@ -227,8 +226,6 @@ namespace {
 
 /// Factor of the time limit for many rows: the server collects them before it sends the first one.
 constexpr int kManyRowsTimeoutFactor = 10;
-/// Factor of the time limit for tables: an hour by default, for an index of all images.
-constexpr int kMigrationTimeoutFactor = 360;
 
 bool have_same_texts(const RunRecord& a, const RunRecord& b) {
   return std::ranges::all_of(list_run_text_fields(),
@@ -317,8 +314,7 @@ std::string bind_filter(soci::statement& statement, const RunFilter& filter) {
 }
 
 /// Returns the rows of a query, with its columns in the members of `Row`. The query is `select`,
-/// the conditions of the filter, and `end`. A non-empty `metric` and its former name are bound to
-/// `end`.
+/// the conditions of the filter, and `end`, to which a non-empty `metric` is bound.
 template <typename Row>
 std::vector<Row> query_rows(soci::session& sql, const std::string& select, const RunFilter& filter,
                             const std::string& end, const std::string& metric,
@@ -330,11 +326,7 @@ std::vector<Row> query_rows(soci::session& sql, const std::string& select, const
   for (std::string Row::*text : texts) statement.exchange(soci::into(row.*text));
   if (value != nullptr) statement.exchange(soci::into(row.*value));
   const std::string conditions = bind_filter(statement, filter);
-  const std::string former(find_former_name_for_current(NameKind::metric, metric));
-  if (!metric.empty()) {
-    statement.exchange(soci::use(metric));
-    statement.exchange(soci::use(former));
-  }
+  if (!metric.empty()) statement.exchange(soci::use(metric));
   statement.alloc();
   statement.prepare(select + conditions + end);
   statement.define_and_bind();
@@ -361,11 +353,10 @@ Records::Records(const std::string& where) : database_(std::make_unique<Database
   const bool are_there = database_->run([&](ConnectionWatchdog& watch) {
     configure_connection(sql, database_->timeout_s);
     watch.on_progress();
-    return has_current_schema_version(sql);
+    return has_record_tables(sql);
   });
   if (!are_there) {
-    database_->run([&](ConnectionWatchdog&) { create_or_migrate_record_tables(sql); },
-                   kMigrationTimeoutFactor);
+    database_->run([&](ConnectionWatchdog&) { create_record_tables(sql); });
   }
   database_->ready = true;
 }
@@ -437,7 +428,7 @@ std::vector<TrendPoint> Records::load_metric_trend(const std::string& metric,
       "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
       "FROM runs JOIN figures ON figures.run = runs.run ";
   const std::string end = " AND " + kNotVoided +
-                          " AND figures.name IN (:figure, :former) AND figures.value IS NOT NULL "
+                          " AND figures.name = :figure AND figures.value IS NOT NULL "
                           "ORDER BY runs.ended_utc, runs.run";
   return database_->run(
       [&](ConnectionWatchdog&) {
@@ -453,7 +444,6 @@ std::optional<RunRecord> Records::find_run_by_id(const std::string& run) {
   auto found = database_->run(
       [&](ConnectionWatchdog&) { return load_run_with_all_parts(database_->sql, run); });
   if (!found) return found;
-  for (CheckedMetric& metric : found->metrics) metric.name = find_current_metric_name(metric.name);
   return found;
 }
 

@@ -72,7 +72,7 @@ class RecordsRefused : public RecordsOffline {
 /// Records of one or more stations in a database: an SQLite file, or PostgreSQL by a connection
 /// string postgresql://...
 ///
-/// Missing tables are created and tables of earlier versions migrated; later versions are an error.
+/// Missing tables are created; tables of another version are an error.
 /// Any number of programs may use a database at the same time. Each run is written in one
 /// transaction, together with its entries in the trail (audit_trail.h). A transaction waits for
 /// those of other programs. Committed data is on the disk. A lost connection is opened again.
@@ -85,7 +85,7 @@ class RecordsRefused : public RecordsOffline {
 /// - the file cannot be opened,
 /// - another program holds a lock, or
 /// - the time limit expired: get_database_timeout_s(), 10 times that for queries of many runs
-///   (without RunFilter::image_sha256), 360 times that for creating or migrating tables.
+///   (without RunFilter::image_sha256).
 class Records {
  public:
   explicit Records(const std::string& where);

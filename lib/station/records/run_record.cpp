@@ -277,7 +277,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kDigits = 9;
 constexpr const char* kRunFormat = "vlp-run/2";
-constexpr const char* kFormerRunFormat = "vlp-run/1";  // runs queued by an older program
 constexpr std::size_t kMaxRunFileBytes = 64 << 20;
 
 std::string join_lines(std::string text) {
@@ -381,8 +380,7 @@ std::optional<GuardBand> read_guard_band(const Json& metric) {
 
 SpooledRun parse_run(const Json& json) {
   const auto format = json.at("format").get<std::string>();
-  const bool is_former = format == kFormerRunFormat;
-  if (format != kRunFormat && !is_former) throw std::runtime_error("another format");
+  if (format != kRunFormat) throw std::runtime_error("another format");
   SpooledRun spooled;
   json.at("records").get_to(spooled.records);
   RunRecord& run = spooled.run;
@@ -396,16 +394,16 @@ SpooledRun parse_run(const Json& json) {
     if (!Id::is_valid_name_of_camera_or_run(id))
       throw std::runtime_error("its run or camera is no id");
   }
-  for (const Json& metric : json.at(is_former ? "figures" : "metrics")) {
+  for (const Json& metric : json.at("metrics")) {
     run.metrics.push_back(
-        {find_current_metric_name(metric.at("name")), metric.at("unit"),
-         read_optional_number(metric.at("value")), read_optional_number(metric.at("gate")),
+        {metric.at("name"), metric.at("unit"), read_optional_number(metric.at("value")),
+         read_optional_number(metric.at("gate")),
          metric.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
          read_guard_band(metric)});
   }
   for (const Json& image : json.at("images")) {
-    run.images.push_back({image.at("step"), image.at("image"), image.at("sha256"),
-                          image.at(is_former ? "refused" : "rejection")});
+    run.images.push_back(
+        {image.at("step"), image.at("image"), image.at("sha256"), image.at("rejection")});
   }
   for (const Json& event : json.value("events", Json::array())) {
     run.events.push_back(

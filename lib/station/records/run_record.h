@@ -127,7 +127,7 @@ struct RunField {
 
 /// Returns all text members of a record, in order. A new text requires a member of RunRecord, an
 /// entry in list_run_text_fields(), code that sets it (make_common_run_record() or the program),
-/// and a migration in record_tables.cpp.
+/// and another kSchemaVersion.
 std::span<const RunField> list_run_text_fields();
 
 /// Returns the id of a run that starts now, 20261121T134501Z-0123456789abcdef: UTC, microseconds in

@@ -8,8 +8,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "rig/renamed.h"
-
 namespace vlp {
 
 std::vector<MetricKind> list_run_metric_kinds() {
@@ -23,8 +21,6 @@ MetricKind find_run_metric_kind(const std::string& name) {
   const auto kinds = list_run_metric_kinds();
   const auto kind = std::ranges::find(kinds, name, &MetricKind::name);
   if (kind != kinds.end()) return *kind;
-  const std::string_view present = find_current_name_for_former(NameKind::metric, name);
-  if (!present.empty()) throw std::invalid_argument("metric " + describe_renaming(name, present));
   std::string names;
   for (const MetricKind& any : kinds) names.append(names.empty() ? "" : ", ").append(any.name);
   throw std::invalid_argument("there is no metric " + name + "; the metrics are: " + names);

@@ -26,7 +26,7 @@ class ArchiveRuns : public testing::Test {
  protected:
   ArchiveRuns() {
     row("a,s1,review,2026-03-15,,1.2.3,key");
-    row("a,s2,look,2026-03-14T09:30:00,,1.2.3,key");  // former name of "review"
+    row("a,s2,review,2026-03-14T09:30:00,,1.2.3,key");
     row("b,s1,gate,2026-03-16,\"rms_px is 2 px, at most 1 px is required\",1.2.3,key");
     row("b,s2,no result,2026-03-17,rotation: is missing,1.2.3,key");
     row("b,s3,pass,,,1.2.3,key");
@@ -51,7 +51,7 @@ class ArchiveRuns : public testing::Test {
       metrics =
           R"({"name": "rms_px", "unit": "px", "limit": 1.0, "direction": "at most", "value": )" +
           std::to_string(*rms_px) + R"(}, {"name": "mean_mm", "unit": "mm", "value": 0.5},)" +
-          R"({"name": "residual_ratio", "value": 1.25}, {"name": "scatter_mm", "value": 0.1})";
+          R"({"name": "residual_ratio", "value": 1.25}, {"name": "repeatability_mm", "value": 0.1})";
     }
     write("archive/" + name + "/session.json",
           R"({"metrics": [)" + metrics +

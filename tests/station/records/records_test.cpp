@@ -191,32 +191,6 @@ void check_two_writers(const std::string& where) {
     EXPECT_THAT(records.find_run_by_id(run.run)->images, SizeIs(2));
 }
 
-/// Records in the tables of version 1.
-const std::string kVersion1 =
-    R"(CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);
-INSERT INTO vlp_schema (version) VALUES (1);
-CREATE TABLE runs (run VARCHAR(64) PRIMARY KEY, kind TEXT NOT NULL, station TEXT NOT NULL, )"
-    R"(camera TEXT NOT NULL, begun_utc TEXT NOT NULL, ended_utc TEXT NOT NULL, )"
-    R"(verdict TEXT NOT NULL, causes TEXT NOT NULL, program TEXT NOT NULL, )"
-    R"(libraries TEXT NOT NULL, config_sha256 TEXT NOT NULL, calibration TEXT NOT NULL);
-CREATE TABLE figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), place INTEGER NOT NULL, )"
-    R"(name VARCHAR(64) NOT NULL, value DOUBLE PRECISION, gate DOUBLE PRECISION, )"
-    R"(at_least INTEGER NOT NULL, met INTEGER NOT NULL, PRIMARY KEY (run, name));
-CREATE TABLE images (run VARCHAR(64) NOT NULL REFERENCES runs (run), step VARCHAR(16) NOT NULL, )"
-    R"(image VARCHAR(255) NOT NULL, sha256 TEXT NOT NULL, refused TEXT NOT NULL, )"
-    R"(PRIMARY KEY (run, step, image));
-CREATE INDEX runs_by_camera ON runs (camera);
-INSERT INTO runs VALUES ('20261121T134501Z-0001', 'unit', 'station-1', 'a', )"
-    R"('2026-11-21T13:45:01Z', '2026-11-21T13:55:01Z', 'FAIL', 'blurred', 'vlp-station 0.1.0', )"
-    R"('none', 'aa', 'format: vlp-calibration/1');
-INSERT INTO figures VALUES ('20261121T134501Z-0001', 1, 'rms_px', 1.5, 1, 0, 0);
-INSERT INTO figures VALUES ('20261121T134501Z-0001', 2, 'coverage', NULL, 0.7, 1, 0);
-INSERT INTO figures VALUES ('20261121T134501Z-0001', 3, 'tilt_deg', 1, NULL, 0, 1);
-INSERT INTO figures VALUES ('20261121T134501Z-0001', 4, 'world_mm', 1, NULL, 0, 1);
-INSERT INTO figures VALUES ('20261121T134501Z-0001', 5, 'focal_percent', 1, NULL, 0, 1);
-INSERT INTO images VALUES ('20261121T134501Z-0001', 'boards', '0000.png', 'bb', '');
-)";
-
 /// Returns tables, their columns, the version and the metrics.
 std::string read_state(const std::string& where) {
   const bool is_server_address = where.starts_with("postgresql://");
@@ -228,76 +202,18 @@ std::string read_state(const std::string& where) {
                  "\nSELECT * FROM vlp_schema;\nSELECT * FROM figures ORDER BY place;\n");
 }
 
-/// Checks the migration of a database with kVersion1.
-void check_migration(const std::string& where) {
-  Records records(where);
-  const auto found = records.find_run_by_id("20261121T134501Z-0001");
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->station, "station-1");
-  EXPECT_EQ(found->operator_name, "");
-  EXPECT_EQ(found->begun_utc, "2026-11-21T13:45:01Z");
-  EXPECT_EQ(found->calibration, "format: vlp-calibration/1");
-  ASSERT_THAT(found->metrics, SizeIs(5));
-  EXPECT_EQ(describe_gate_result(found->metrics[0]), "rms_px is 1.5 px, at most 1 px is required");
-  EXPECT_EQ(describe_gate_result(found->metrics[1]),
-            "coverage is not known, at least 0.7 is required");
-  EXPECT_EQ(found->metrics[2].unit, "deg");
-  EXPECT_EQ(found->metrics[3].name, "world_offset_mm");  // the present name of world_mm
-  EXPECT_EQ(found->metrics[3].unit, "mm");
-  EXPECT_THAT(records.load_metric_trend("world_offset_mm", {}), SizeIs(1));
-  EXPECT_THAT(records.load_metric_trend("world_mm", {}), SizeIs(1));
-  EXPECT_EQ(found->metrics[4].unit, "%");
-  EXPECT_FALSE(found->metrics[0].guard_band);
-  EXPECT_THAT(found->images, SizeIs(1));
-  records.store_run(make_sample_record(numbered_run_id(5), "b", 0.1));
-  EXPECT_THAT(records.list_run_summaries({}), SizeIs(2));
-  EXPECT_EQ(records.find_run_by_id(numbered_run_id(5))->metrics[0].unit, "px");
-  EXPECT_TRUE(records.find_run_by_id(numbered_run_id(5))->metrics[0].guard_band);
-  EXPECT_THAT(found->events, IsEmpty());
-  check_events(records);
-  EXPECT_THAT(records.check_records_by_audit_trail("").problems, IsEmpty());
-}
-
-/// Checks that a database with kVersion1 is migrated once, if another program is about to migrate
-/// it.
-void check_migration_by_another(const std::string& where) {
-  const TemporaryFolder folder;
-  const auto halfway = folder / "halfway";
-  const bool is_server_address = where.starts_with("postgresql://");
-  const std::string other = std::string(is_server_address ? "BEGIN;\n" : "BEGIN IMMEDIATE;\n") +
-                            "UPDATE vlp_schema SET version = version;\n"
-                            "ALTER TABLE figures ADD COLUMN unit VARCHAR(16) NOT NULL DEFAULT '';\n"
-                            "UPDATE figures SET unit = 'by another';\n"
-                            "\\! touch '" +
-                            halfway.string() +
-                            "'; sleep 0.5\n"
-                            "UPDATE vlp_schema SET version = 2;\nCOMMIT;\n";
-  auto done = std::async(std::launch::async, [&] { return run_database_client(where, other); });
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (!std::filesystem::exists(halfway) && std::chrono::steady_clock::now() < until) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+/// Checks that a database of another version is rejected and unchanged.
+void check_other_versions(const std::string& where) {
+  { const Records created(where); }
+  for (const char* version : {"1", "99"}) {
+    run_database_client(where, std::string("UPDATE vlp_schema SET version = ") + version + ";\n");
+    const std::string before = read_state(where);
+    EXPECT_THAT(rejection_message([&] { Records records(where); }),
+                HasSubstr(std::string(": contains records of version ") + version +
+                          ", this program reads version " + std::to_string(kSchemaVersion) +
+                          ": use the vlp-station that wrote them"));
+    EXPECT_EQ(read_state(where), before);
   }
-  EXPECT_EQ(rejection_message([&] { Records records(where); }), "");
-  done.get();
-  EXPECT_EQ(Records(where).find_run_by_id("20261121T134501Z-0001")->metrics[0].unit, "by another");
-}
-
-/// Checks that a database with kVersion1 is unchanged if its migration fails.
-void check_stopped_migration(const std::string& where) {
-  const std::string before = read_state(where);
-  EXPECT_THAT(rejection_message([&] { Records records(where); }), HasSubstr("stopped"));
-  EXPECT_EQ(read_state(where), before);
-}
-
-/// Checks that a database of a later version is rejected and unchanged.
-void check_later_version(const std::string& where) {
-  run_database_client(where, "UPDATE vlp_schema SET version = 99;\n");
-  const std::string before = read_state(where);
-  EXPECT_THAT(
-      rejection_message([&] { Records records(where); }),
-      HasSubstr(": contains records of version 99, this program supports versions up to " +
-                std::to_string(kSchemaVersion) + ": use the newer vlp-station that wrote them"));
-  EXPECT_EQ(read_state(where), before);
 }
 
 TEST(DescribeUtcProblem, ReturnsEmptyTextOnlyForExistingDaysAndTimes) {
@@ -309,20 +225,6 @@ TEST(DescribeUtcProblem, ReturnsEmptyTextOnlyForExistingDaysAndTimes) {
                           "2026-11-21T13:60", "2026-11-21T13:45:60", "2026-11-21 13:45"}) {
     EXPECT_THAT(describe_utc_problem(bad), StartsWith("should be a UTC as ")) << bad;
   }
-}
-
-TEST(Records, MigratesSqliteDatabaseOfVersion1) {
-  const TemporaryFolder folder;
-  const std::string file = (folder / "records.db").string();
-  run_database_client(file, kVersion1);
-  check_migration(file);
-}
-
-TEST(Records, MigratesSqliteDatabaseOfVersion1OnceForTwoPrograms) {
-  const TemporaryFolder folder;
-  const std::string file = (folder / "records.db").string();
-  run_database_client(file, kVersion1);
-  check_migration_by_another(file);
 }
 
 TEST(Records, CheckDatabaseWritableThrowsWhenUpdateFails) {
@@ -337,40 +239,13 @@ TEST(Records, CheckDatabaseWritableThrowsWhenUpdateFails) {
   EXPECT_THAT(rejection_message([&] { records.check_database_writable(); }), HasSubstr("stopped"));
 }
 
-TEST(Records, KeepsSqliteVersion1WhenMigrationFails) {
+TEST(Records, RejectsDatabasesOfOtherVersions) {
   const TemporaryFolder folder;
-  const std::string file = (folder / "records.db").string();
-  run_database_client(file,
-                      kVersion1 +
-                          "CREATE TRIGGER stop BEFORE UPDATE ON figures BEGIN SELECT RAISE(ABORT, "
-                          "'stopped'); END;\n");
-  check_stopped_migration(file);
-}
-
-TEST(Records, RejectsSqliteDatabaseOfLaterVersion) {
-  const TemporaryFolder folder;
-  const std::string file = (folder / "records.db").string();
-  run_database_client(file, kVersion1);
-  check_later_version(file);
-}
-
-TEST(Records, MigratesVersion1AndRejectsLaterVersionInPostgres) {
+  check_other_versions((folder / "records.db").string());
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
-  run_database_client(server.uri(), kVersion1);
-  check_migration(server.uri());
-  run_database_client(server.uri(), kDropAll + kVersion1);
-  check_migration_by_another(server.uri());
-  run_database_client(server.uri(),
-                      kDropAll + kVersion1 +
-                          "CREATE FUNCTION stop() RETURNS trigger LANGUAGE plpgsql AS 'BEGIN "
-                          "RAISE EXCEPTION ''stopped''; END';\n"
-                          "CREATE TRIGGER stop BEFORE UPDATE ON figures FOR EACH ROW EXECUTE "
-                          "FUNCTION stop();\n");
-  check_stopped_migration(server.uri());
-  run_database_client(server.uri(), kDropAll + kVersion1);
-  check_later_version(server.uri());
+  check_other_versions(server.uri());
 }
 
 TEST(Records, StoresAndFindsRunsInSqlite) {

@@ -65,34 +65,6 @@ TEST(ReadSpooledRun, ReturnsAllFieldsOfSerializedRun) {
   EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
 }
 
-TEST(ReadSpooledRun, ReplacesFormerMetricNamesByNewNames) {
-  const TemporaryFolder folder;
-  RunRecord run = numbered_run(1);
-  run.metrics = {{"check_lamps", "", 1, 0.95, Direction::at_least}};
-  const auto read =
-      read_spooled_run(folder.file("run.json", serialize_spooled_run({run, "records.db"})));
-  ASSERT_THAT(read.run.metrics, SizeIs(1));
-  EXPECT_EQ(read.run.metrics[0].name, "check_lamp_inlier_fraction");
-}
-
-TEST(ReadSpooledRun, ReadsFormerFormat) {
-  const TemporaryFolder folder;
-  const RunRecord run = numbered_run(1);
-  std::string text = serialize_spooled_run({run, "records.db"});
-  for (const auto& [present, former] : {std::pair("vlp-run/2", "vlp-run/1"),
-                                        {"\"metrics\"", "\"figures\""},
-                                        {"\"rejection\"", "\"refused\""}}) {
-    for (auto at = text.find(present); at != std::string::npos; at = text.find(present)) {
-      text.replace(at, std::string_view(present).size(), former);
-    }
-  }
-  const RunRecord read = read_spooled_run(folder.file("run.json", text)).run;
-  ASSERT_THAT(read.images, SizeIs(run.images.size()));
-  EXPECT_EQ(read.images[1].rejection, run.images[1].rejection);
-  ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
-  EXPECT_EQ(read.metrics[0].name, run.metrics[0].name);
-}
-
 TEST(ReadSpooledRun, EscapesImageNamesThatAreNotUtf8) {
   const TemporaryFolder folder;
   RunRecord run = numbered_run(1);

@@ -89,10 +89,8 @@ TEST_F(RunMetrics, SelectValuesOfStudyUnitsReturnsRequestedOrRepeatedlyMeasuredU
   EXPECT_THROW(select_values_of_reference_units(judged(), {{"c", 0.2}}), std::invalid_argument);
 }
 
-TEST(FindRunMetricKind, ThrowsNamingNewNameOrKnownMetrics) {
+TEST(FindRunMetricKind, ThrowsNamingKnownMetrics) {
   EXPECT_STREQ(find_run_metric_kind("check_mean_mm").unit, "mm");
-  EXPECT_EQ(rejection_message<std::invalid_argument>([] { find_run_metric_kind("halves_px"); }),
-            "metric 'halves_px' is now called 'split_half_px'");
   EXPECT_THAT([] { find_run_metric_kind("rms_um"); },
               testing::ThrowsMessage<std::invalid_argument>(
                   AllOf(HasSubstr("there is no metric rms_um"), HasSubstr("rms_px"))));
