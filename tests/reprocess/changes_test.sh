@@ -133,7 +133,7 @@ reprocess "$results" --shard-size 3 --previous "$previous" --gates "$scratch/gat
 
 "$source_dir/scripts/reprocess.sh" --help >"$said"
 [ "$(wc -L <"$said")" -le 80 ] && grep -q '^Exit code: ' "$said" || fail "help is wider than a terminal, or cut short"
-options_of() { sed -n '/^while/,/^done/p' "$1" | grep -o -- '--[a-z][a-z-]*' | grep -v -x -- '--camera-option\|--help\|--look' | sort -u; }
+options_of() { sed -n '/^while/,/^done/p' "$1" | grep -o -- '--[a-z][a-z-]*' | grep -v -x -- '--camera-option\|--help' | sort -u; }
 for option in $(options_of "$source_dir/scripts/reprocess.sh"); do
   grep -q -- "^$option " "$said" || fail "--help does not describe $option"
 done
@@ -152,7 +152,6 @@ refused '--shard-size: should be a number' "$archive" "$scratch/refused" --shard
 refused '--readout: should be rows or columns' "$archive" "$scratch/refused" --readout diagonals
 refused 'nor a folder with config.yaml' "$archive" "$scratch/refused" --profile odd
 refused '--scan: should be files or folders' "$archive" "$scratch/refused" --scan everywhere
-refused "option '--look' is now called '--scan'" "$archive" "$scratch/refused" --look files
 refused '--keep: should be a number' "$archive" "$scratch/refused" --keep all
 refused 'has no former result' --diff "$results" camera-00001/session-01
 refused 'contains no result of' --diff "$results" camera-00001/session-77
