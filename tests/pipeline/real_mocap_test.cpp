@@ -1,19 +1,18 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// Poses of a hand-held camera above a board on the floor against motion capture, when the real
-/// captures are there: vlp-intrinsics, vlp-convert and vlp-locate as a user starts them.
+/// captures are there: vlp-intrinsics, vlp-convert, vlp-locate and scripts/compare_with_mocap.py as
+/// a user starts them.
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 
-#include <Eigen/Cholesky>
-#include <Eigen/Geometry>
-#include <Eigen/SVD>
-#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <map>
 #include <set>
+#include <sstream>
 
 #include "captures/csv_reader.h"
-#include "captures/fixes_table.h"
-#include "geometry/frames.h"
 #include "rig/calibration.h"
 #include "support/program.h"
 #include "support/real_data.h"
@@ -24,116 +23,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Poses of the captured body, which carries the camera.
-class CapturedBody {
- public:
-  explicit CapturedBody(const fs::path& file) {
-    const CsvTable csv(file);
-    for (std::size_t row = 0; row < csv.num_rows(); ++row) {
-      const auto number = [&](const char* name) {
-        return csv.get_cell_number(row, csv.get_required_column(name));
-      };
-      const std::string stamp(csv.get_cell_text(row, csv.get_required_column("timestamp [ns]")));
-      stamps_ns_.push_back(std::stoll(stamp));
-      positions_m_.emplace_back(number("x"), number("y"), number("z"));
-      rotations_.emplace_back(number("qw"), number("qx"), number("qy"), number("qz"));
-    }
-  }
-
-  /// Returns the interpolated world_from_body at an image, whose name is its stamp.
-  Eigen::Isometry3d pose_at(const std::string& image) const {
-    const long long stamp_ns = std::stoll(image);
-    const auto next = std::upper_bound(stamps_ns_.begin(), stamps_ns_.end(), stamp_ns);
-    const auto i = static_cast<std::size_t>(next - stamps_ns_.begin());
-    const double t = static_cast<double>(stamp_ns - stamps_ns_.at(i - 1)) /
-                     static_cast<double>(stamps_ns_.at(i) - stamps_ns_.at(i - 1));
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() =
-        rotations_[i - 1].normalized().slerp(t, rotations_[i].normalized()).toRotationMatrix();
-    pose.translation() = (1 - t) * positions_m_[i - 1] + t * positions_m_[i];
-    return pose;
-  }
-
- private:
-  std::vector<long long> stamps_ns_;
-  std::vector<Eigen::Vector3d> positions_m_;
-  std::vector<Eigen::Quaterniond> rotations_;
-};
-
-/// Unknowns of the comparison: camera on the body, and the board in the capture volume.
-struct Mounting {
-  Eigen::Vector3d camera_in_body_m{0, 0, 0};
-  Eigen::Isometry3d volume_from_board = Eigen::Isometry3d::Identity();
-
-  Eigen::Vector3d camera_in_board_m(const Eigen::Isometry3d& volume_from_body) const {
-    return volume_from_board.inverse() * (volume_from_body * camera_in_body_m);
-  }
-};
-
-using Fixes = std::vector<FixRow>;
-
-/// Fits the mounting to fixes: a similarity without scale as initial value, then least squares with
-/// the loss 2 (sqrt(1 + (e / 5 mm)^2) - 1) of each coordinate.
-Mounting fit_mounting(const Fixes& fixes, const CapturedBody& body) {
-  Eigen::Matrix3Xd cameras(3, std::ssize(fixes)), bodies(3, std::ssize(fixes));
-  for (Eigen::Index i = 0; i < cameras.cols(); ++i) {
-    const FixRow& row = fixes[static_cast<std::size_t>(i)];
-    cameras.col(i) = row.fix->pose.position_m;
-    bodies.col(i) = body.pose_at(row.image).translation();
-  }
-  Mounting mounting;
-  mounting.volume_from_board.matrix() = Eigen::umeyama(cameras, bodies, false);
-  for (int iteration = 0; iteration < 100; ++iteration) {
-    Eigen::Matrix<double, 9, 9> normal = Eigen::Matrix<double, 9, 9>::Zero();
-    Eigen::Matrix<double, 9, 1> right = Eigen::Matrix<double, 9, 1>::Zero();
-    const Eigen::Matrix3d board_from_volume = mounting.volume_from_board.linear().transpose();
-    for (const FixRow& row : fixes) {
-      const Eigen::Isometry3d pose = body.pose_at(row.image);
-      const Eigen::Vector3d at_m = mounting.camera_in_board_m(pose);
-      const Eigen::Vector3d error_m = at_m - row.fix->pose.position_m;
-      // Derivatives by the lever arm, by a rotation of the board, and by its position.
-      Eigen::Matrix<double, 3, 9> jacobian;
-      jacobian.leftCols<3>() = board_from_volume * pose.linear();
-      jacobian.middleCols<3>(3) << 0, at_m.z(), -at_m.y(), -at_m.z(), 0, at_m.x(), at_m.y(),
-          -at_m.x(), 0;
-      jacobian.rightCols<3>() = -board_from_volume;
-      constexpr double scale_m = 5e-3;
-      const Eigen::Vector3d weights = (1 + (error_m / scale_m).array().square()).rsqrt().matrix();
-      normal += jacobian.transpose() * weights.asDiagonal() * jacobian;
-      right -= jacobian.transpose() * weights.asDiagonal() * error_m;
-    }
-    const Eigen::Matrix<double, 9, 1> step = normal.ldlt().solve(right);
-    mounting.camera_in_body_m += step.head<3>();
-    const Eigen::Vector3d turn = step.segment<3>(3);
-    // at' = exp(turn) at: the board is rotated by the inverse.
-    mounting.volume_from_board.linear() *=
-        Eigen::AngleAxisd(-turn.norm(), turn.normalized()).toRotationMatrix();
-    mounting.volume_from_board.translation() += step.tail<3>();
-  }
-  return mounting;
-}
-
-struct Figures {
-  std::size_t fixes;
-  double median_mm, max_mm;
+struct ErrorStatistics {
+  std::size_t fixes = 0;
+  double median_mm = 0, max_mm = 0;
   /// RMS of the errors over their stated standard deviations.
-  double normalized;
+  double normalized = 0;
 };
-
-Figures judge(const Fixes& fixes, const CapturedBody& body, const Mounting& mounting) {
-  std::vector<double> errors_mm;
-  double squares = 0;
-  for (const FixRow& row : fixes) {
-    const Eigen::Vector3d error_m =
-        mounting.camera_in_board_m(body.pose_at(row.image)) - row.fix->pose.position_m;
-    errors_mm.push_back(1e3 * error_m.norm());
-    squares += error_m.cwiseQuotient(row.fix->sd->head<3>()).squaredNorm();
-  }
-  std::ranges::sort(errors_mm);
-  const std::size_t n = errors_mm.size();
-  return {n, (errors_mm[(n - 1) / 2] + errors_mm[n / 2]) / 2, errors_mm.back(),
-          std::sqrt(squares / (3 * static_cast<double>(n)))};
-}
 
 class MotionCapture : public testing::Test {
  protected:
@@ -186,28 +81,36 @@ class MotionCapture : public testing::Test {
           1);
     }
   }
-  Fixes locate(const std::string& half, const std::string& lens) const {
+  /// Locates the images of a half with a lens; writes `<lens>-<half>.csv`.
+  void locate(const std::string& half, const std::string& lens) const {
     run("vlp-convert " + path(half + ".csv") + board() + "--to lamps --sd-m 0.0002 -o " +
         path(half + "-points"));
     run("vlp-locate " + path(half + "-points/detections.csv") + "--lamps " +
         path(half + "-points/lamps.yaml") + "--calibration " + path(lens + ".yaml") +
-        "--roll-pitch-sd-deg 90 -o " + path("fixes.csv") + "--poses " + path("poses.csv"));
-    Fixes fixes = read_fixes(folder / "fixes.csv");
-    std::erase_if(fixes, [](const FixRow& row) { return !row.fix || !row.fix->sd; });
-    return fixes;
+        "--roll-pitch-sd-deg 90 -o " + path(lens + "-" + half + ".csv"));
   }
-  /// Judges the fixes of one half with lens and mounting from the other half.
-  Figures compare(const std::string& fitted, const std::string& judged) const {
-    const CapturedBody body(data / "body.csv");
-    const Fixes fit = locate(fitted, fitted);
-    EXPECT_GE(fit.size(), 12U);
-    const Fixes test = locate(judged, fitted);
-    EXPECT_GE(test.size(), 12U);
-    for (const FixRow& row : test) EXPECT_GT(row.fix->pose.position_m.z(), 1) << row.image;
-    const Figures figures = judge(test, body, fit_mounting(fit, body));
-    fmt::print("fixes={} median_mm={:.2f} max_mm={:.2f} normalized={:.2f}\n", figures.fixes,
-               figures.median_mm, figures.max_mm, figures.normalized);
-    return figures;
+  /// Compares the fixes of one half, with lens and mounting from the other half.
+  ErrorStatistics compare(const std::string& fitted, const std::string& judged) const {
+    locate(fitted, fitted);
+    locate(judged, fitted);
+    const auto result =
+        run_program(VLP_SOURCE_DIR "/scripts/compare_with_mocap.py '" +
+                    (data / "body.csv").string() + "' " + path(fitted + "-" + fitted + ".csv") +
+                    path(fitted + "-" + judged + ".csv") + "-o " + path("truth.csv"));
+    EXPECT_EQ(result.exit_code, 0) << result.errors;
+    fmt::print("{}", result.output);
+    ErrorStatistics errors;
+    EXPECT_EQ(std::sscanf(result.output.c_str(),
+                          "fixes %zu error %lf mm median, %lf mm largest error / sd %lf",
+                          &errors.fixes, &errors.median_mm, &errors.max_mm, &errors.normalized),
+              4)
+        << result.output;
+    const CsvTable truth(folder / "truth.csv");
+    EXPECT_EQ(truth.num_rows(), errors.fixes);
+    for (std::size_t row = 0; row < truth.num_rows(); ++row) {
+      EXPECT_GT(truth.get_cell_number(row, truth.get_required_column("z_m")), 1);
+    }
+    return errors;
   }
 
   std::map<std::string, std::size_t> half_of_image;
@@ -218,12 +121,12 @@ class MotionCapture : public testing::Test {
 TEST_F(MotionCapture, MedianErrorIsBelow6MmWithOwnCorners) {
   calibrate_halves_from_images();
   for (const auto& [fitted, judged] : {std::pair("even", "odd"), {"odd", "even"}}) {
-    const Figures figures = compare(fitted, judged);
-    EXPECT_EQ(figures.fixes, 15);
-    EXPECT_LT(figures.median_mm, 6);
-    EXPECT_LT(figures.max_mm, 12);
-    EXPECT_GT(figures.normalized, 0.7);
-    EXPECT_LT(figures.normalized, 1.1);
+    const ErrorStatistics errors = compare(fitted, judged);
+    EXPECT_EQ(errors.fixes, 15U);
+    EXPECT_LT(errors.median_mm, 6);
+    EXPECT_LT(errors.max_mm, 12);
+    EXPECT_GT(errors.normalized, 0.7);
+    EXPECT_LT(errors.normalized, 1.1);
   }
 }
 
@@ -243,10 +146,11 @@ TEST_F(MotionCapture, FisheyeLensOfEachHalfHasFocalLengthOfOtherModels) {
 TEST_F(MotionCapture, MedianErrorIsBelow6MmWithCornersOfOtherProgram) {
   calibrate_halves_from_corners();
   for (const auto& [fitted, judged] : {std::pair("even", "odd"), {"odd", "even"}}) {
-    const Figures figures = compare(fitted, judged);
-    EXPECT_LT(figures.median_mm, 6);
-    EXPECT_GT(figures.normalized, 0.6);
-    EXPECT_LT(figures.normalized, 1.1);
+    const ErrorStatistics errors = compare(fitted, judged);
+    EXPECT_GE(errors.fixes, 12U);
+    EXPECT_LT(errors.median_mm, 6);
+    EXPECT_GT(errors.normalized, 0.6);
+    EXPECT_LT(errors.normalized, 1.1);
   }
 }
 
