@@ -13,6 +13,7 @@
 
 #include "evaluation/metric.h"
 #include "support/program.h"
+#include "support/real_data.h"
 #include "support/schema.h"
 #include "support/temporary_folder.h"
 
@@ -58,16 +59,19 @@ std::vector<std::string> lines_in(const fs::path& file) {
   return lines;
 }
 
-/// The indented command lines that begin with one of our programs or cp, joined where a backslash
-/// says so.
+/// Returns the indented command lines that begin with one of our programs or a command of
+/// kCommands, joined where a backslash says so.
 std::vector<std::string> commands_in(const fs::path& page) {
+  constexpr const char* kCommands[] = {"build/bin/vlp-", "vlp-",  "cp ",
+                                       "mkdir -p out/",  "grep ", "scripts/compare_"};
   std::vector<std::string> commands;
   bool continues = false;
   for (const std::string& line : lines_in(page)) {
     if (continues) {
       commands.back() += line;
-    } else if (line.starts_with("    build/bin/vlp-") || line.starts_with("    vlp-") ||
-               line.starts_with("    cp ")) {
+    } else if (std::ranges::any_of(kCommands, [&](const char* command) {
+                 return line.starts_with(std::string("    ") + command);
+               })) {
       commands.push_back(line.substr(4));
     } else {
       continue;
@@ -183,8 +187,19 @@ TEST(DocumentationPages, CommandsOnPagesExitWithZero) {
   for (const char* name : {"datasets", "scripts"}) {
     fs::create_directory_symlink(kSource / name, folder / name);
   }
+  // What scripts/fetch_recordings.sh would fetch for the tutorial.
+  bool has_recordings = true;
+  fs::create_directories(folder / "out/recordings");
+  for (const char* name : {"aprilgrid-mocap", "chessboard-fisheye", "led-1khz-frame"}) {
+    const fs::path recording = real_data(name);
+    has_recordings = has_recordings && !recording.empty();
+    if (has_recordings) {
+      fs::create_directory_symlink(recording, folder / "out/recordings" / name);
+    }
+  }
   std::set<std::string> ran, programs;
   for (const fs::path& page : pages_in_reading_order()) {
+    if (name_of_page(page) == "apps/TUTORIAL.md" && !has_recordings) continue;
     for (const std::string& command : commands_in(page)) {
       if (!ran.insert(command).second) continue;
       const auto result = run_program("cd '" + (folder / "").string() + "' && " + command);
@@ -349,6 +364,8 @@ struct Question {
 };
 constexpr Question kQuestions[] = {
     {"What is VLP?", "README.md", "VLP: positions from light", "visible light positioning"},
+    {"How do I try it with real images?", "apps/TUTORIAL.md", "1. Get the recordings",
+     "scripts/fetch_recordings.sh"},
     {"May I use it in a product?", "README.md", "Read on", "Apache-2.0"},
     {"How do I install and remove it?", "apps/README.md", "Install", "apt purge"},
     {"Does it run on Ubuntu, or in Docker?", "apps/README.md", "Install", "Ubuntu and other"},
@@ -451,25 +468,89 @@ TEST(DocumentationPages, EachSourceThatWritesJsonIsNamedInSchema) {
   EXPECT_EQ(writers, have_schemas);
 }
 
-TEST(DocumentationPages, NamedTestsAndBenchmarksExist) {
-  std::string tests;
-  for (const fs::path& file : find_files({".cpp", ".txt", ".sh"})) {
-    if (name_of_page(file).starts_with("tests/")) tests += TemporaryFolder::read_content(file);
+/// Returns the names of tests in the sources, such as "Suite.Name", and those of CMake.
+std::vector<std::string> test_names() {
+  std::vector<std::string> names;
+  for (const fs::path& file : find_files({".cpp", ".txt"})) {
+    if (!name_of_page(file).starts_with("tests/")) continue;
+    const std::string text = TemporaryFolder::read_content(file);
+    const std::regex test(
+        "\\b(?:TEST(?:_F|_P)?\\(\\s*(\\w+),\\s*(\\w+)\\)|add_test\\(NAME ([\\w.]+))");
+    for (std::sregex_iterator at(text.begin(), text.end(), test), end; at != end; ++at) {
+      names.push_back((*at)[3].matched ? (*at)[3].str() : (*at)[1].str() + "." + (*at)[2].str());
+    }
   }
-  std::size_t programs = 0;
+  return names;
+}
+
+bool has_test(const std::vector<std::string>& names, const std::string& expression) {
+  const std::regex wanted(expression);
+  return std::ranges::any_of(
+      names, [&](const std::string& name) { return std::regex_search(name, wanted); });
+}
+
+/// Commands of a page in code, such as those of cells "repeat with": their programs, scripts and
+/// tests exist. Tests of their programs run the commands that take seconds.
+TEST(DocumentationPages, NamedTestsAndBenchmarksExist) {
+  const std::vector<std::string> names = test_names();
+  ASSERT_GT(names.size(), 2000U);
+  std::string benchmarks;
+  for (const fs::path& file : find_files({".txt"})) {
+    if (name_of_page(file).starts_with("tests/")) {
+      benchmarks += TemporaryFolder::read_content(file);
+    }
+  }
+  std::size_t commands = 0;
   for (const fs::path& page : pages()) {
-    const std::string prose = read_prose(page);
+    const std::string prose = std::regex_replace(read_prose(page), std::regex("\n"), " ");
     for (const std::string& name : matches(prose, "build/tests/benchmarks/([a-z_]+)")) {
-      ++programs;
+      ++commands;
       EXPECT_TRUE(fs::exists(kSource / "tests/benchmarks" / (name + ".cpp")) ||
-                  tests.find(name) != std::string::npos)
+                  benchmarks.find(name) != std::string::npos)
           << name_of_page(page) << ": " << name;
     }
-    for (const std::string& suite : matches(prose, "ctest [^`]*-R ([A-Za-z]+)")) {
-      EXPECT_NE(tests.find(suite), std::string::npos) << name_of_page(page) << ": " << suite;
+    for (const std::string& name :
+         matches(prose, "[`& ]((?:tests|scripts)/[a-z_/]+\\.(?:py|sh))")) {
+      ++commands;
+      EXPECT_TRUE(fs::exists(kSource / name)) << name_of_page(page) << ": " << name;
+    }
+    for (const std::string& test : matches(prose, "ctest [^`]*-R ('[^']+'|[^ `]+)")) {
+      ++commands;
+      const std::string expression = test.front() == '\'' ? test.substr(1, test.size() - 2) : test;
+      EXPECT_TRUE(has_test(names, expression)) << name_of_page(page) << ": " << test;
+    }
+    for (std::string filter : matches(prose, "--gtest_filter='?([A-Za-z0-9*._]+)")) {
+      ++commands;
+      filter = std::regex_replace(filter, std::regex("\\."), "\\.");
+      filter = std::regex_replace(filter, std::regex("\\*"), ".*");
+      EXPECT_TRUE(has_test(names, filter)) << name_of_page(page) << ": " << filter;
     }
   }
-  EXPECT_GT(programs, 5U);
+  EXPECT_GT(commands, 60U);
+}
+
+/// "Works as typed": cells "repeat with" have only complete commands.
+TEST(DocumentationPages, RepeatWithCellsBeginWithCommands) {
+  const std::regex command(
+      "^`(?:[A-Z_]+=[^ ]+ )*(?:ctest --test-dir build -R |build/(?:bin|tests)/|tests/|scripts/|for "
+      ")");
+  std::size_t cells = 0;
+  bool inside = false;
+  for (const std::string& line : lines_in(kSource / "tests/ACCURACY.md")) {
+    if (line.ends_with("| repeat with |")) {
+      inside = true;
+    } else if (!line.starts_with("|")) {
+      inside = false;
+    } else if (inside && !line.starts_with("|---")) {
+      const auto begin = line.rfind(" | ", line.size() - 3);
+      ASSERT_NE(begin, std::string::npos) << line;
+      const std::string cell = line.substr(begin + 3);
+      if (cell == "|") continue;  // the command above
+      ++cells;
+      EXPECT_TRUE(std::regex_search(cell, command)) << line;
+    }
+  }
+  EXPECT_GT(cells, 40U);
 }
 
 TEST(DocumentationPages, SectionsOfTheoryCitedInSourcesExist) {
