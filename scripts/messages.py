@@ -20,7 +20,7 @@ parts, or with the code alone if they contain a part that the entry has already.
   - a code has no annotation with cause and remedy, or two
   - a message about an error or a doubt neither states a remedy, nor is in CLEAR, nor contains a part of an entry whose
     code is in the same file
-  - a text in CLEAR is in no such message
+  - a text in CLEAR is in no such message, or one in FIRST_ERRORS in no literal
   - the page differs from the generated one
 """
 import re
@@ -38,6 +38,23 @@ Errors and warnings that need an explanation; those that state a remedy, or what
 values and names. `--verbose` prints more messages, `--quiet` errors only. Keys, columns, units:
 [Formats](../datasets/README.md#formats).
 """
+
+# Messages that newcomers meet first: part of the message, cause, remedy.
+FIRST_ERRORS = [
+    ("cannot be written", "the folder of `-o` is missing", "`mkdir -p` it"),
+    ("is it the right file?", "files exchanged, such as the map given as `--calibration`", "see the example in `--help`"),
+    ("this column is missing", "other table, or saved by a spreadsheet with semicolons and decimal commas", "save it with commas"),
+    ("is it in the right unit?", "mm, us or degrees", "m, s, rad"),
+    ("lamps cannot be identified", "stripes give frequencies only with the row time", "data sheet, or `vlp-train --row-time`"),
+    ("but the stripes of", "wrong row time or frequencies", "take the measured row time if the frequencies are certain"),
+    ("no lamp was identified wholly in view", "wrong `--readout`; exposure too long; lamps steady, cut or too small",
+     "omit `--readout`; look at `--annotate`"),
+    ("the images show", "`board.yaml` describes another board", "copy the values that the message states"),
+    ("expected_max_error_px", "exit code 1: few tilts or positions of the board",
+     "the view that `next view` names, or `--lens auto` ([example](TUTORIAL.md#2-estimate-the-lens))"),
+    ("the lamps contradict each other", "map of another room, confused lamps, or a tilted camera taken as level",
+     "check the map; `--roll-pitch-sd-deg 90`"),
+]
 
 # Prefix of the codes: title and introduction of their section, in the order of the page.
 SECTIONS = {
@@ -320,7 +337,8 @@ def group_by_code(annotations):
 
 
 def render_page(entries):
-    text = INTRODUCTION
+    text = INTRODUCTION + "\n## First errors\n\n| message | cause | what to do |\n|---|---|---|\n"
+    text += "".join(f"| `{part}` | {cause} | {remedy} |\n" for part, cause, remedy in FIRST_ERRORS)
     for prefix, (title, introduction) in SECTIONS.items():
         rows = []
         for group in entries.values():
@@ -360,6 +378,14 @@ def check_annotations(texts, annotations):
     return problems
 
 
+def check_first_errors(texts):
+    """Returns the parts of FIRST_ERRORS that no literal contains."""
+    sources = [text for file, text in texts.items() if file.suffix in (".cpp", ".h")]
+    literals = [literal for text in sources for _, literal in find_literals(text)]
+    missing = [part for part, _, _ in FIRST_ERRORS if not any(part in literal for literal in literals)]
+    return [f"FIRST_ERRORS: no message contains: {part}" for part in missing]
+
+
 def check_messages(texts, annotations):
     """Returns the messages without remedy and entry, and the texts of CLEAR that no message contains."""
     problems, unused = [], set(CLEAR)
@@ -381,7 +407,7 @@ def main():
     root = Path(arguments[0]) if arguments else Path(__file__).resolve().parents[1]
     texts = {file: (root / file).read_text(encoding="utf-8") for file in find_sources(root)}
     annotations = [one for file, text in texts.items() for one in find_annotations(file, text)]
-    problems = check_annotations(texts, annotations) + check_messages(texts, annotations)
+    problems = check_annotations(texts, annotations) + check_messages(texts, annotations) + check_first_errors(texts)
     print("\n".join(problems), file=sys.stderr, end="\n" if problems else "")
     if any(one.prefix not in SECTIONS for one in annotations):
         return 1

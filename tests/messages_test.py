@@ -48,13 +48,14 @@ class Tree:
 
     def run(self, *options):
         """Returns the exit code and stderr of scripts/messages.py."""
-        errors, arguments, clear = io.StringIO(), sys.argv, messages.CLEAR
+        errors, arguments, clear, first = io.StringIO(), sys.argv, messages.CLEAR, messages.FIRST_ERRORS
         sys.argv, messages.CLEAR = ["messages.py", *options, str(self.root)], []
+        messages.FIRST_ERRORS = [("lies far below", "night", "wait")]
         try:
             with contextlib.redirect_stderr(errors):
                 code = messages.main()
         finally:
-            sys.argv, messages.CLEAR = arguments, clear
+            sys.argv, messages.CLEAR, messages.FIRST_ERRORS = arguments, clear, first
         return code, errors.getvalue()
 
 
@@ -101,7 +102,9 @@ class Messages(unittest.TestCase):
 
     def test_detects_removed_message(self):
         edit = ('  warnings.push_back("lies far below all limits");\n', "")
-        self.assertIn("check.cpp:5: LENS-2: no message below contains `below all`", self.problems(edit=edit))
+        errors = self.problems(edit=edit)
+        self.assertIn("check.cpp:5: LENS-2: no message below contains `below all`", errors)
+        self.assertIn("FIRST_ERRORS: no message contains: lies far below", errors)
 
     def test_detects_changed_message(self):
         edit = ("differs from the others", "differs from all others")

@@ -247,6 +247,16 @@ std::string help_with_subcommands(const std::string& program) {
   return help;
 }
 
+TEST(DocumentationPages, StationPageListsEachCommand) {
+  const std::string help = run_program("vlp-station --help").output;
+  const auto commands = matches(help.substr(help.find("\nSubcommands:\n")), "\n  ([a-z-]+) ");
+  ASSERT_GT(commands.size(), 10U);
+  const std::string page = read_prose(kSource / "apps/vlp-station.md");
+  for (const std::string& command : commands) {
+    EXPECT_THAT(page, testing::ContainsRegex("\n\\|[^|]*`" + command + "[ `]")) << command;
+  }
+}
+
 /// Returns the options that --help lists, such as "--output", at the beginning of their lines.
 std::set<std::string> listed_options(const std::string& help) {
   const auto options = matches(help, "\n  (?:-[a-z],)?(--[a-z][a-z0-9-]*)");
@@ -381,6 +391,7 @@ constexpr Question kQuestions[] = {
     {"I have a fisheye lens.", "apps/vlp-intrinsics.md", "Lens models", "OPENCV_FISHEYE"},
     {"I have a calibration from ROS.", "apps/vlp-convert.md", "vlp-convert", "--to ros"},
     {"I do not know the row time.", "apps/vlp-train.md", "Row time", "--row-time"},
+    {"Which errors do newcomers meet first?", "apps/MESSAGES.md", "First errors", "mkdir -p"},
     {"Why is no lamp found?", "apps/MESSAGES.md", "Lamps in images", "wrong row time"},
     {"Why is there no fix?", "apps/MESSAGES.md", "Fixes", "Hang more lamps"},
     {"My lamp map is not exact.", "apps/vlp-adjust.md", "vlp-adjust", "--refine-map"},

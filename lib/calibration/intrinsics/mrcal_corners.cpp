@@ -205,7 +205,7 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
     BoardView& view = views[entry->second];
     const bool none = end == from + 1 && !first_pixel;
     if (!none && end - from != lattice.num_points_per_part()) {
-      // [LENS-6] `image '{}' has` | mrcal's table: a row for each corner, detected or not; one row
+      // [LENS-6] `image '...' has` | mrcal's table: a row for each corner, detected or not; one row
       //   with `-` without board | complete it
       throw table.error(line, fmt::format("image '{}' has {}", name,
                                           describe_wrong_count(board, lattice, end - from)));
