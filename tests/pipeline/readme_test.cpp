@@ -335,6 +335,18 @@ TEST(DocumentationPages, ReadmeHasAtMost6000Bytes) {
   EXPECT_LE(fs::file_size(kSource / "README.md"), 6000U);
 }
 
+TEST(DocumentationPages, CellsOfFormatsHaveAtMost40Words) {
+  std::size_t cells = 0;
+  for (const std::string& line : lines_in(kSource / "datasets/README.md")) {
+    if (!line.starts_with("|")) continue;
+    for (const std::string& cell : matches(line, "((?:[^|\\\\]|\\\\.)+)")) {
+      ++cells;
+      EXPECT_LE(matches(cell, "([^ ]+)").size(), 40U) << cell;
+    }
+  }
+  EXPECT_GT(cells, 200U);
+}
+
 TEST(DocumentationPages, LinkedFilesAndSectionsExist) {
   std::size_t links = 0;
   for (const fs::path& page : pages()) {
@@ -398,7 +410,7 @@ constexpr Question kQuestions[] = {
     {"Does it work while driving, or in a hand?", "apps/vlp-locate.md", "Inclination and motion",
      "hand-held camera"},
     {"What do exit codes mean?", "apps/README.md", "Conventions", "Exit code 0: done"},
-    {"What is in fixes.csv?", "datasets/README.md", "Formats", "yaw_sd_rad"},
+    {"What is in fixes.csv?", "datasets/README.md", "Fixes", "yaw_sd_rad"},
     {"Where is pixel (0, 0), and how is yaw counted?", "datasets/README.md", "Formats",
      "counter-clockwise"},
     {"How do I read session.json?", "datasets/README.md", "Documents of JSON",
