@@ -61,21 +61,27 @@ class OverTime(unittest.TestCase):
     MOVED = [(0, 2, 150, complex(0.8, 0.6)), (1, 5, 240, complex(-3, 4))]
 
     def test_detects_drifts_and_moved_lamps_with_dates(self):
-        fleets, found_cameras, false = 20, 0, 0
-        for seed in range(fleets):
+        found_cameras, found_lamps, false = dict.fromkeys(self.DRIFTS, 0), 0, 0
+        for seed in range(FLEETS):
             made_up = Fleet(seed, drifts=self.DRIFTS, moved=self.MOVED)
             found = fleet.analyze_fleet(*fleet_rows(made_up))
             cameras = {alarm["camera"] for alarm in found["cameras"]}
-            found_cameras += len(cameras & {"camera-03", "camera-08", "camera-15"})
+            for number in self.DRIFTS:
+                found_cameras[number] += f"camera-{number:02d}" in cameras
             lamps = [(lamp["map"][0], lamp["lamp"]) for lamp in found["lamps"]]
             false += bool(cameras - {"camera-03", "camera-08", "camera-15"}) or sorted(lamps) != [("0", 2), ("1", 5)]
+            found_lamps += len({("0", 2), ("1", 5)} & set(lamps))
             for room, lamp, day, moved in self.MOVED:
                 one = next(one for one in found["lamps"] if (one["map"][0], one["lamp"]) == (str(room), lamp))
                 self.assertLess(one["before"]["date"], made_up.date(day), (seed, lamp))
                 self.assertGreaterEqual(one["since"]["date"], made_up.date(day), (seed, lamp))
                 self.assertLess(abs(complex(*one["displacement_mm"]) - moved), 5 * sum(one["sd_mm"]), (seed, lamp))
-        self.assertGreaterEqual(found_cameras, 3 * fleets - 7)  # 39 of 600 cameras are missed, mostly tilts
-        self.assertLessEqual(false, 4)  # at most 1 is expected
+        focal, tilt, center = found_cameras.values()
+        words = f"of {FLEETS} fleets: focal length {focal}, tilt {tilt}, center {center}, lamps {found_lamps}, false alarms {false}"
+        if "VLP_FLEETS" in os.environ:
+            print(words)
+        self.assertGreaterEqual(focal + tilt + center, 2.65 * FLEETS, words)  # 39 of 600 cameras are missed, mostly tilts
+        self.assertLessEqual(false, 3 + 0.05 * FLEETS, words)  # at most 1 of 20 is expected
 
     def test_min_detectable_changes_are_detected_in_95_percent(self):
         fleets = 40
@@ -121,13 +127,17 @@ class OverTime(unittest.TestCase):
             self.assertAlmostEqual(found["changes"][0]["change"], 0.5 * 0.95, delta=5 * found["changes"][0]["sd"])
 
     def test_false_alarm_rate_is_as_stated(self):
-        fleets = 40
+        fleets = 2 * FLEETS
         for honest in (True, False):
             alarms = 0
             for seed in range(1000, 1000 + fleets):
                 found = fleet.analyze_fleet(*fleet_rows(Fleet(seed, honest=honest)))
                 alarms += bool(found["cameras"] or found["lamps"])
-            self.assertLessEqual(alarms, 6, honest)  # at most 2 are expected; more than 6 in 1 of 200 such tests
+            words = f"false alarms in {alarms} of {fleets} fleets" + (" that scatter by their sds only" if honest else "")
+            if "VLP_FLEETS" in os.environ:
+                print(words)
+            # Of 40 at most 2 are expected; more than 6 in 1 of 200 such tests.
+            self.assertLessEqual(alarms, 0.05 * fleets + 3 * (0.05 * fleets) ** 0.5, words)
 
     def test_false_alarm_rate_holds_for_unequal_sds(self):
         fleets = 40
