@@ -6,10 +6,8 @@
 #include <algorithm>
 #include <array>
 #include <limits>
-#include <tuple>
 #include <utility>
 
-#include "positioning/body_solution.h"
 #include "support/body_rig.h"
 #include "support/matchers.h"
 
@@ -60,61 +58,6 @@ class PositionerMovingOrTiltedCamera : public testing::Test {
   }
 };
 
-TEST(ComputeInitialBodyStatesFromThreeLamps, ReturnsReasonWithoutState) {
-  const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
-  const BodyPrior prior;
-  const auto find_status = [&](const std::array<Eigen::Vector3d, 3>& lamps_m) {
-    FrameObservations frame;
-    for (const Eigen::Vector3d& lamp_m : lamps_m) {
-      frame.add_current({lamp_m, lamp_m.normalized(), {}, 1, 0}, 0, 1);
-    }
-    const InitialStates initial_states =
-        compute_initial_body_states_from_three_lamps(frame, {0, 1, 2}, {no_arm_m, prior});
-    EXPECT_EQ(initial_states.count > 0, initial_states.status == FixStatus::ok);
-    return initial_states.status;
-  };
-  EXPECT_EQ(find_status({Eigen::Vector3d(-1, 0.2, 2), {1, 0.3, 2}, {0, -1, 2.5}}), FixStatus::ok);
-  EXPECT_EQ(find_status({Eigen::Vector3d(-1, 0.2, 2), {0, 0.2, 2}, {1, 0.2, 2}}),
-            FixStatus::degenerate)
-      << "collinear";
-  EXPECT_EQ(find_status({Eigen::Vector3d(-1, 0.2, -2), {1, 0.3, -2}, {0, -1, -2.5}}),
-            FixStatus::lamp_below_camera);
-}
-
-TEST(IsBodyPositionDetermined, LimitsSdByMeanDistanceToLamps) {
-  FrameObservations frame;
-  frame.add_current({{0, 0, 1}, {}, {}, 1, 0}, 1, 1);
-  frame.add_current({{0, 3, 0}, {}, {}, 1, 0}, 2, 1);
-  BodyFix fix;
-  BodyPrior at_rest, moving;
-  moving.set_sd(kBodyVelocity, 1);
-  for (const auto& [sd_m, determined, determined_if_moving] : {std::tuple(0.49, true, true),
-                                                               {0.51, true, false},
-                                                               {1.99, true, false},
-                                                               {2.01, false, false}}) {
-    fix.covariance(1, 1) = sd_m * sd_m;
-    EXPECT_EQ(is_body_position_determined(frame, at_rest, fix), determined) << sd_m;
-    EXPECT_EQ(is_body_position_determined(frame, moving, fix), determined_if_moving) << sd_m;
-  }
-}
-
-TEST_F(PositionerMovingOrTiltedCamera, ReturnsLampBelowCameraForInclinationBeyondHorizon) {
-  Sensors upside_down = driving();
-  upside_down.inclination = Inclination{3.1, 0};
-  EXPECT_EQ(locate(seen(), upside_down).status, FixStatus::lamp_below_camera);
-}
-
-TEST_F(PositionerMovingOrTiltedCamera, EqualsFixWithoutMotionWhenMotionIsExactlyZero) {
-  stand();
-  Sensors standing;
-  standing.motion = KnownMotion();
-  const auto detections = seen();
-  const Fix with = locate(detections, standing), without = locate(detections, {});
-  ASSERT_TRUE(with.has_succeeded());
-  EXPECT_EQ(with.state.pose.position_m, without.state.pose.position_m);
-  EXPECT_EQ(with.pose_covariance(), without.pose_covariance());
-}
-
 TEST_F(PositionerMovingOrTiltedCamera, ReturnsRowTimeUnknownForMotionWithoutReadoutTiming) {
   auto detections = seen();
   rig.calibration.camera.row_time_s.reset();
@@ -148,17 +91,25 @@ TEST_F(PositionerMovingOrTiltedCamera, ReturnsNotFiniteForNanOrInvalidSdOfSensor
   }
 }
 
-TEST_F(PositionerMovingOrTiltedCamera, ReturnsNotFiniteForEarlierFrameWithoutFiniteTime) {
-  const std::vector<Detection> detections = seen(), before = seen_from(rig, kBodyNoise_px, -0.05);
-  ASSERT_FALSE(before.empty());
-  for (const auto& [before_s, status] :
-       {std::pair(0.05, FixStatus::ok),
-        {std::numeric_limits<double>::infinity(), FixStatus::not_finite},
-        {std::numeric_limits<double>::quiet_NaN(), FixStatus::not_finite}}) {
-    const EarlierFrame earlier{before, before_s};
-    EXPECT_EQ(rig.positioner().compute_position_fix(detections, driving(), {&earlier, 1}).status,
-              status)
-        << before_s;
+TEST_F(PositionerMovingOrTiltedCamera, EarlierFramesHaveToBeEarlierAndDistinct) {
+  const auto detections = seen();
+  const double infinite_s = std::numeric_limits<double>::infinity();
+  const double nan_s = std::numeric_limits<double>::quiet_NaN();
+  for (const auto& [times_s, status] :
+       {std::pair<std::vector<double>, FixStatus>({0.05, 0.1}, FixStatus::ok),
+        {{0}, FixStatus::not_finite},
+        {{-0.05}, FixStatus::not_finite},
+        {{infinite_s}, FixStatus::not_finite},
+        {{nan_s}, FixStatus::not_finite},
+        {{0.1, 0.05, 0.1}, FixStatus::not_finite}}) {
+    std::vector<std::vector<Detection>> before;
+    for (const double before_s : times_s) {
+      before.push_back(seen_from(rig, kBodyNoise_px, before_s > 0 && before_s < 1 ? -before_s : 0));
+    }
+    std::vector<EarlierFrame> frames;
+    for (std::size_t i = 0; i < before.size(); ++i) frames.push_back({before[i], times_s[i]});
+    EXPECT_EQ(rig.positioner().compute_position_fix(detections, driving(), frames).status, status)
+        << testing::PrintToString(times_s);
   }
 }
 
@@ -252,14 +203,10 @@ TEST_F(PositionerMovingOrTiltedCamera, ReturnsInconsistentOrMirroredMapForThreeL
 }
 
 TEST_F(PositionerMovingOrTiltedCamera, ReturnsMirroredMapForMirroredLampMap) {
-  const auto mirrored = [](LampMap map) {
-    for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
-    return map;
-  };
   const auto drive = seen();
   lean();
   const auto in_hand = seen();
-  rig.map = mirrored(rig.map);
+  for (Lamp& lamp : rig.map.lamps) lamp.position_m.y() *= -1;
   EXPECT_EQ(locate(drive, driving()).status, FixStatus::mirrored_map);
   EXPECT_EQ(locate(in_hand, held()).status, FixStatus::mirrored_map);
   EXPECT_EQ(locate(in_hand, leaning()).status, FixStatus::mirrored_map);
@@ -298,14 +245,6 @@ TEST_F(PositionerMovingOrTiltedCamera, RejectsLampMovedBy36MmAndReturnsTruth) {
   }
 }
 
-/// A velocity above the maximum indicates another error.
-TEST_F(PositionerMovingOrTiltedCamera, ReturnsInconsistentForSpeedFarAboveMaximum) {
-  rig.body.motion.velocity_m_per_s = {3, 0};
-  Sensors slow;
-  slow.motion = KnownMotion::make_motion_prior_from_limits(0.2, 3);
-  EXPECT_EQ(locate(seen(), slow).status, FixStatus::inconsistent);
-}
-
 /// The lamps determine each state to a few percent of its prior.
 TEST_F(PositionerMovingOrTiltedCamera, ReturnsInconsistentForStateBeyondFiveSigmasOfPrior) {
   Sensors known;
@@ -332,16 +271,6 @@ TEST_F(PositionerMovingOrTiltedCamera, ReturnsInconsistentForTiltedCameraUnlessT
   EXPECT_EQ(locate(seen(), {}).status, FixStatus::inconsistent);
   EXPECT_NE(describe_fix_status(FixStatus::inconsistent).find("tilt"), std::string_view::npos);
   expect_truth(locate(seen(), leaning()));
-}
-
-TEST_F(PositionerMovingOrTiltedCamera, MatchesTruthForLargeNationalCoordinates) {
-  const Eigen::Vector3d origin_m(4.5e5, 5e6, 120);
-  for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
-  rig.body.pose.position_m += origin_m;
-  lean();
-  Sensors sensors = held();
-  sensors.height = KnownHeight{origin_m.z(), 0.1};
-  expect_truth(locate(seen(), sensors));
 }
 
 /// Noise of 2.5 times the reported one: a lamp is rejected only if that explains the residuals a

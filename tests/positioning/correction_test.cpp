@@ -24,25 +24,11 @@ class ComputeLevelFromCameraMatrix : public testing::Test {
   Eigen::Vector2d z{0.3, -0.2};
 };
 
-TEST_F(ComputeLevelFromCameraMatrix, ReturnsIdentityWhenCalibrationHasNoCorrections) {
-  for (const Correction correction : {Correction::none, Correction::all}) {
-    EXPECT_EQ(compute_level_from_camera_matrix(calibration, correction),
-              Eigen::Matrix3d::Identity());
-  }
-}
-
 TEST_F(ComputeLevelFromCameraMatrix, ThrowsWhenRequestedCorrectionIsMissing) {
   EXPECT_THROW(compute_level_from_camera_matrix(calibration, Correction::rotation),
                std::invalid_argument);
   EXPECT_THROW(compute_level_from_camera_matrix(calibration, Correction::dispersion),
                std::invalid_argument);
-}
-
-TEST_F(ComputeLevelFromCameraMatrix, MapsZenithToOriginForTiltModel) {
-  calibration.rotation_center = tilted_by(calibration.camera, 0.05, 2);
-  const Eigen::Vector3d& zenith = calibration.rotation_center->zenith_in_camera;
-  const auto matrix = compute_level_from_camera_matrix(calibration, Correction::rotation);
-  EXPECT_THAT(seen_at(matrix, zenith.hnormalized()), IsNear(Eigen::Vector2d(0, 0), 1e-15));
 }
 
 TEST_F(ComputeLevelFromCameraMatrix, SubtractsOffsetOfRotationCenterForShiftModel) {

@@ -10,7 +10,6 @@
 #include "positioning/positioner.h"
 #include "support/body_rig.h"
 #include "support/matchers.h"
-#include "support/scatter.h"
 #include "support/synthetic_rig.h"
 
 namespace vlp {
@@ -44,93 +43,6 @@ TEST(ComputeFixErrorBudget, NoiseTermMatchesFormulaForPinholeAndEqualHeights) {
                                    unit_m / std::sqrt(spread));
     EXPECT_THAT(Eigen::Vector4d(budget->noise.diagonal().cwiseSqrt()), IsNear(expected, 1e-12));
   }
-}
-
-/// Draws the errors of each source alone: the scatter of the fixes matches the budget.
-class ErrorBudgetTerm : public testing::Test {
- protected:
-  SyntheticRig rig{
-      synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {{0.1, 0.2, 0}, 0.5}, {}};
-  Random random{21};
-  static constexpr int kDraws = 20000;
-
-  ErrorBudget budget(const ErrorSources& sources) {
-    const Camera& camera = rig.calibration.camera;
-    return compute_fix_error_budget(get_lamp_positions(rig.map),
-                                    Lens(camera.lens_model, camera.intrinsics), rig.camera, sources)
-        .value();
-  }
-
-  /// Unit weights, as the budget assumes.
-  template <typename Draw>
-  void expect_scatter(const Eigen::Matrix4d& covariance, const Draw& draw) {
-    const auto exact = seen_from(rig);
-    Scatter scatter(rig.camera, covariance);
-    for (int i = 0; i < kDraws; ++i) scatter.add(draw(exact).state.pose);
-    EXPECT_LT(scatter.excess().cwiseAbs().maxCoeff(), 0.03) << scatter.excess().transpose();
-  }
-};
-
-TEST_F(ErrorBudgetTerm, PrincipalPointCovarianceMatchesScatterOfFixes) {
-  rig.map.lamps.resize(3);
-  const Positioner positioner(rig.map, rig.calibration);
-  // The covariance of four states from two errors is singular; yaw and height barely change.
-  Eigen::Matrix4d covariance = budget({1, 0.5, 0, 0}).center;
-  const auto exact = seen_from(rig);
-  Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
-  for (int i = 0; i < kDraws; ++i) {
-    auto shifted = exact;
-    const Eigen::Vector2d shift = 0.5 * Eigen::Vector2d(random.normal(), random.normal());
-    for (Detection& detection : shifted) detection.pixel += shift;
-    const Pose pose = positioner.compute_position_fix(shifted).state.pose;
-    Eigen::Vector4d error;
-    error << pose.position_m - rig.camera.position_m, pose.yaw_rad - rig.camera.yaw_rad;
-    sum += error * error.transpose();
-  }
-  EXPECT_LT((sum / kDraws - covariance).norm(), 0.05 * covariance.norm());
-}
-
-TEST_F(ErrorBudgetTerm, TiltCovarianceMatchesScatterOfFixes) {
-  const Positioner positioner(rig.map, rig.calibration);
-  const Eigen::Matrix4d covariance = budget({1, 0, 0.003, 0}).tilt;
-  const auto exact = seen_from(rig);
-  Eigen::Matrix4d sum = Eigen::Matrix4d::Zero();
-  for (int i = 0; i < kDraws; ++i) {
-    const Inclination wrong{0.003 * random.normal(), 0.003 * random.normal()};
-    const Pose pose = positioner.compute_position_fix(exact, {wrong, 0, {}}).state.pose;
-    Eigen::Vector4d error;
-    error << pose.position_m - rig.camera.position_m, pose.yaw_rad - rig.camera.yaw_rad;
-    sum += error * error.transpose();
-  }
-  EXPECT_LT((sum / kDraws - covariance).norm(), 0.05 * covariance.norm());
-}
-
-TEST_F(ErrorBudgetTerm, LampMapCovarianceMatchesScatterOfFixes) {
-  expect_scatter(budget({1, 0, 0, 0.004}).lamp_map, [&](const auto& exact) {
-    LampMap wrong = rig.map;
-    for (Lamp& lamp : wrong.lamps) {
-      lamp.position_m += 0.004 * Eigen::Vector3d(random.normal(), random.normal(), random.normal());
-    }
-    return Positioner(wrong, rig.calibration).compute_position_fix(exact);
-  });
-}
-
-TEST_F(ErrorBudgetTerm, NoiseCovarianceMatchesScatterOfFixes) {
-  const Positioner positioner(rig.map, rig.calibration);
-  expect_scatter(budget({0.4, 0, 0, 0}).noise, [&](auto noisy) {
-    for (Detection& detection : noisy) detection.sigma_px = 0.4;
-    return positioner.compute_position_fix(with_noise(noisy, random));
-  });
-}
-
-TEST(ComputeFixErrorBudget, TotalCovarianceIsSumOfSourceCovariances) {
-  const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
-  const auto budget = compute_fix_error_budget(get_lamp_positions(synthetic_lamps()), lens,
-                                               {{0, 0, 0}, 0}, {0.1, 0.2, 0.003, 0.004});
-  ASSERT_TRUE(budget);
-  EXPECT_THAT(budget->total_pose_covariance(),
-              IsNear(Matrix4(budget->noise + budget->center + budget->tilt + budget->lamp_map), 0));
-  EXPECT_GT(budget->lamp_map(0, 0), 0);
 }
 
 TEST(ComputeFixErrorBudget, ReturnsNulloptWithoutTwoLampsInFrontOfLens) {
@@ -282,14 +194,6 @@ TEST_F(ErrorBudgetPriorCases, EqualsBudgetOfStandingCameraWhenPriorIsTight) {
   ASSERT_TRUE(found && standing);
   expect_close(found->noise, standing->noise, 1e-6);
   expect_close(found->total_pose_covariance(), standing->total_pose_covariance(), 1e-6);
-}
-
-/// An unknown tilt is estimated, independently of the calibration.
-TEST_F(ErrorBudgetPriorCases, CalibratedTiltTermIsNegligibleWhenTiltIsEstimated) {
-  const auto known = budget(prior({true, false, false}));
-  const auto unknown = budget(prior({true, false, true}));
-  ASSERT_TRUE(known && unknown);
-  EXPECT_LT(unknown->tilt(0, 0), 0.01 * known->tilt(0, 0));
 }
 
 TEST_F(ErrorBudgetPriorCases, ReturnsNulloptForTwoOrCollinearLampsWithFreeTilt) {

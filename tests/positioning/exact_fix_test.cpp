@@ -175,33 +175,22 @@ TEST(PositionerNoiseless, MatchesTruthForLargeNationalCoordinates) {
   }
 }
 
-TEST(PositionerNoiseless, MatchesTruthWithEveryParametricLensExceptFisheye) {
+TEST(PositionerNoiseless, MatchesTruthWithEveryLens) {
   const std::vector<double> opencv12{520,  522,  403,  296,  -0.28, 0.09,  1e-4, -2e-4,
                                      -.01, 0.02, 0.01, 1e-3, 1e-3,  -1e-3, 2e-3, 1e-3};
+  std::vector<Camera> cameras{splined_camera(), fisheye_camera()};
   for (const LensModel model : {LensModel::pinhole, LensModel::stereographic, LensModel::opencv4,
                                 LensModel::opencv5, LensModel::opencv8, LensModel::opencv12}) {
-    SyntheticRig rig = make_rig(8, false);
-    Camera& camera = rig.calibration.camera;
-    camera.lens_model = model;
-    camera.intrinsics = opencv12;
-    camera.intrinsics.resize(num_lens_parameters(model));
-    rig.camera = {{0.1, 0.1, 0}, 1};
-    expect_exact(rig);
+    cameras.push_back(synthetic_camera());
+    cameras.back().lens_model = model;
+    cameras.back().intrinsics = opencv12;
+    cameras.back().intrinsics.resize(num_lens_parameters(model));
   }
-}
-
-TEST(PositionerNoiseless, MatchesTruthWithSplinedLens) {
-  SyntheticRig rig = make_rig(8, false);
-  rig.calibration.camera = splined_camera();
-  rig.camera = {{0.1, 0.1, 0}, 1};
-  expect_exact(rig);
-}
-
-TEST(PositionerNoiseless, MatchesTruthWithFisheye) {
-  SyntheticRig rig = make_rig(8, false);
-  rig.calibration.camera = fisheye_camera();
-  for (int yaw_deg = -180; yaw_deg <= 180; yaw_deg += 20) {
-    rig.camera = {{0.1, 0.1, 0}, rad_from_deg(yaw_deg)};
+  for (const Camera& camera : cameras) {
+    SCOPED_TRACE(lens_model_name(camera.lens_model));
+    SyntheticRig rig = make_rig(8, false);
+    rig.calibration.camera = camera;
+    rig.camera = {{0.1, 0.1, 0}, 1};
     expect_exact(rig);
   }
 }

@@ -18,13 +18,6 @@ class FixResult : public testing::Test {
               rolling_calibration(),
               {{{0.1, -0.05, 0}, 0.4}, {{0.8, -0.6}, 1.5, {0.06, -0.08}}},
               CameraMount{{0.2, -0.1, 0.3}, 0.5}};
-
-  Sensors free_sensors() const {
-    Sensors sensors;
-    sensors.inclination_sigma_rad = 0.2;
-    sensors.motion = KnownMotion{{0, 0}, 0, 1, 2};
-    return sensors;
-  }
 };
 
 TEST_F(FixResult, ProjectedLampsAreDetectionsOfMovingCamera) {
@@ -88,25 +81,6 @@ TEST_F(FixResult, DetectionResidualsHaveRmsOfFixAndStateUse) {
   }
   ASSERT_EQ(fix.rejected_lamps, 1);
   EXPECT_NEAR(std::sqrt(squares_px2 / fix.lamps), fix.residual_px, 1e-3);
-}
-
-TEST_F(FixResult, JacobiansAndPriorsReproduceNoiseCovariance) {
-  rig.body.motion = {{0, 0}, 0, {0.06, -0.08}};
-  const auto detections = seen_from(rig, 0.1);
-  const Sensors sensors = free_sensors();
-  const Positioner positioner = rig.positioner();
-  const Fix fix = positioner.compute_position_fix(detections, sensors);
-  ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
-  BodyCovariance information = BodyCovariance::Zero();
-  information.diagonal().tail<5>() << 1, 1, 1 / 4.0, 25, 25;
-  for (const Detection& detection : detections) {
-    const auto& jacobian = positioner.compute_detection_residual(detection, fix).predicted.jacobian;
-    information += jacobian.transpose() * jacobian / (0.1 * 0.1);
-  }
-  const Eigen::Matrix<double, kBodyStates, 1> sd = fix.noise_covariance.diagonal().cwiseSqrt();
-  const BodyCovariance identity = information * fix.noise_covariance;
-  EXPECT_THAT(sd.asDiagonal() * identity * sd.cwiseInverse().asDiagonal(),
-              IsNear(BodyCovariance(BodyCovariance::Identity()), 1e-3));
 }
 
 TEST_F(FixResult, AmbiguousFixListsCandidatesWithLikelihoods) {

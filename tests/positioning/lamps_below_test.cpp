@@ -93,24 +93,6 @@ TEST_F(CameraAboveLamps, FixIsExactWithUnknownAndKnownMotion) {
   expect_exact(sensors);
 }
 
-TEST_F(CameraAboveLamps, FixOfOneLampUsesHeightAndYaw) {
-  Sensors sensors;
-  sensors.height_and_yaw = HeightAndYaw{1.4, 0.7};
-  rig.map.lamps.resize(1);
-  const Fix fix = rig.positioner().compute_position_fix(seen_from(rig, kSigma_px), sensors);
-  ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
-  EXPECT_THAT(fix.state.pose.position_m, IsNear(rig.body.pose.position_m, 1e-9));
-}
-
-TEST_F(CameraAboveLamps, FixUsesKnownHeight) {
-  Sensors sensors;
-  sensors.inclination_sigma_rad = 1;
-  sensors.height = KnownHeight{1.4, 1e-6};
-  const Fix fix = locate(sensors);
-  ASSERT_TRUE(fix.has_succeeded()) << fix_status_name(fix.status);
-  EXPECT_NEAR(std::sqrt(fix.pose_covariance()(2, 2)), 1e-6, 1e-8);
-}
-
 /// States (X, Y, Z, yaw, vx, vy, yaw rate, roll, pitch) of a fix.
 Eigen::VectorXd states_of(const Fix& fix) {
   const auto& [position_m, yaw_rad] = fix.state.pose;
@@ -173,7 +155,7 @@ class CameraAboveUncertainLamps : public CameraAboveLamps {
   /// Compares the covariance of the fix with that of the lamps' positions, propagated by
   /// derivatives of the fix. A dispersion offset changes with the positions.
   void expect_propagated(const Eigen::MatrixXd& lamp_covariance,
-                         const Eigen::Matrix<double, 2, 6>& offset_by_lamps = {}) const {
+                         const Eigen::Matrix<double, 2, 6>& offset_by_lamps) const {
     constexpr double step_m = 1e-4;
     const auto detections = seen_from(rig, 1e-3);
     ASSERT_EQ(detections.size(), 2U);
@@ -202,21 +184,6 @@ class CameraAboveUncertainLamps : public CameraAboveLamps {
   }
 };
 
-TEST_F(CameraAboveUncertainLamps, CovarianceIncludesErrorsOfSurvey) {
-  for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.01;
-  expect_propagated(1e-4 * Eigen::MatrixXd::Identity(6, 6));
-}
-
-TEST_F(CameraAboveUncertainLamps, CovarianceIncludesErrorsOfAdjustedLamps) {
-  Eigen::MatrixXd factors(6, 6);
-  Random random(5);
-  for (double& value : factors.reshaped()) value = random.uniform(-0.01, 0.01);
-  const Eigen::MatrixXd covariance = factors * factors.transpose();
-  rig.calibration.adjustment = Adjustment{{}, 1, 1, 0.1};
-  set_lamp_covariance(covariance);
-  expect_propagated(covariance);
-}
-
 TEST_F(CameraAboveUncertainLamps, CovarianceIncludesErrorsOfDispersionOffsetByLamps) {
   rig.calibration.dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
   Eigen::Matrix<double, 2, 6> jacobian;
@@ -227,17 +194,6 @@ TEST_F(CameraAboveUncertainLamps, CovarianceIncludesErrorsOfDispersionOffsetByLa
   append_parameters(*rig.calibration.covariance, list_pair_names(kOffsetParameter), jacobian,
                     Matrix2::Zero());
   expect_propagated(covariance, jacobian);
-}
-
-TEST_F(CameraAboveLamps, FixFailsWithoutKeyOfMap) {
-  rig.body.motion.inclination = {0.1, -0.1};
-  BodyRig overhead = rig;
-  overhead.map.lamps_below_camera = false;
-  Sensors sensors;
-  sensors.inclination_sigma_rad = 1;
-  EXPECT_FALSE(overhead.positioner()
-                   .compute_position_fix(seen_from(rig, kSigma_px), sensors)
-                   .has_succeeded());
 }
 
 TEST_F(CameraAboveLamps, FixOfCLibraryIsThatOfPositioner) {

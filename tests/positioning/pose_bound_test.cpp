@@ -42,19 +42,6 @@ std::optional<Matrix4> compute_limit(const BodyRig& rig, const Sensors& sensors)
   return exact.noise_covariance.topLeftCorner<4, 4>();
 }
 
-TEST(BodyPrior, MotionIsEstimatedWhenVelocityOrYawRateIsUncertain) {
-  BodyPrior prior;
-  EXPECT_FALSE(prior.is_motion_estimated() || prior.is_motion_or_tilt_estimated());
-  prior.set_sd(kBodyVelocity, 0.01);
-  EXPECT_TRUE(prior.is_motion_estimated() && prior.is_motion_or_tilt_estimated());
-  prior.set_sd(kBodyVelocity, 0);
-  prior.set_sd(kBodyYawRate, 0.01);
-  EXPECT_TRUE(prior.is_motion_estimated() && prior.is_motion_or_tilt_estimated());
-  prior.set_sd(kBodyYawRate, 0);
-  prior.set_sd(kBodyRoll, 0.01);
-  EXPECT_TRUE(!prior.is_motion_estimated() && prior.is_motion_or_tilt_estimated());
-}
-
 /// Four or five lamps of a ceiling, tilt of up to 80 degrees known from the image alone: errors at
 /// most 1.5 times the bound of six states.
 TEST(Positioner, FixErrorsAreAtMost150PercentOfCramerRaoBoundForTiltUpTo80Degrees) {

@@ -35,14 +35,6 @@ TEST_F(PositionerStatus, ReturnsTooFewLampsForFewerThanTwo) {
   EXPECT_EQ(status(seen(2)), FixStatus::ok);
 }
 
-TEST_F(PositionerStatus, ReturnsTooFewLampsWhenMapHasOnlyOneOfTwo) {
-  auto detections = seen(2);
-  detections[1].lamp = 77;
-  const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
-  EXPECT_EQ(fix.status, FixStatus::too_few_lamps);
-  EXPECT_EQ(fix.unknown_lamps, 1);
-}
-
 TEST_F(PositionerStatus, ReturnsOkAndCountsLampsNotInMap) {
   auto detections = seen(4);
   detections[1].lamp = 77;
@@ -113,14 +105,6 @@ TEST_F(PositionerStatus, ThrowsOnOptionsOutOfRange) {
                  std::invalid_argument)
         << bad;
   }
-  EXPECT_THROW(make([](PositionerOptions& options) {
-                 options.mount = {{0, kNan, 0}, 0};
-               }),
-               std::invalid_argument);
-  EXPECT_THROW(make([](PositionerOptions& options) {
-                 options.mount = {{0, 0, 0}, kNan};
-               }),
-               std::invalid_argument);
 }
 
 TEST_F(PositionerStatus, ReturnsOutsideLensForUnreachablePixel) {
@@ -144,12 +128,6 @@ TEST_F(PositionerStatus, ReturnsDegenerateWhenAllPixelsCoincide) {
     for (Detection& detection : detections) detection.pixel = detections[0].pixel;
     EXPECT_EQ(status(detections), FixStatus::degenerate) << count;
   }
-}
-
-TEST_F(PositionerStatus, ReturnsDegenerateWhenPixelsAreCloserThanNoise) {
-  auto detections = seen(2);
-  detections[1].pixel = detections[0].pixel + Eigen::Vector2d(0.1, 0);
-  EXPECT_EQ(status(detections), FixStatus::degenerate);
 }
 
 TEST_F(PositionerStatus, ReturnsAmbiguousWhenTwoLampsFitTwoPoses) {
@@ -183,8 +161,10 @@ TEST_F(PositionerStatus, ConstructorThrowsForInvalidMapCalibrationOrOptions) {
   cut.camera.intrinsics.pop_back();
   EXPECT_THROW(build(rig.map, cut), std::invalid_argument);
   PositionerOptions options;
-  options.mount = CameraMount{{kNan, 0, 0}, 0};
-  EXPECT_THROW(build(rig.map, rig.calibration, options), std::invalid_argument);
+  for (const CameraMount& mount : {CameraMount{{kNan, 0, 0}, 0}, {{0, 0, 0}, kNan}}) {
+    options.mount = mount;
+    EXPECT_THROW(build(rig.map, rig.calibration, options), std::invalid_argument);
+  }
   options.mount.reset();
   options.correction = Correction::rotation;
   EXPECT_THROW(build(rig.map, rig.calibration, options), std::invalid_argument);

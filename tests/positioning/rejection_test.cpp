@@ -149,24 +149,6 @@ TEST_F(PositionerOutlierRejection, RejectsSmallDisplacementOnlyWhenSigmaIsReport
   }
 }
 
-/// The limit of the residuals follows from the nearest neighbor of each lamp.
-TEST_F(PositionerOutlierRejection, RejectsLampTakenForItsNeighbor) {
-  rig.map = make_lamp_map({{-0.7, -0.4, 1.6},
-                           {0.7, -0.4, 1.6},
-                           {0.7, 0.4, 1.6},
-                           {-0.7, 0.4, 1.6},
-                           {0, 0.1, 1.6},
-                           {0.01, 0.15, 1.6}});
-  auto detections = seen(5);
-  for (Detection& detection : detections) detection.sigma_px.reset();
-  EXPECT_EQ(locate(detections).rejected_lamps, 0);
-  detections[4].lamp = 6;
-  const Fix fix = locate(detections);
-  expect_truth(fix);
-  EXPECT_EQ(fix.rejected_lamps, 1);
-  EXPECT_EQ(fix.rejected_ids[0], 6);
-}
-
 /// In a grid of lamps scale and rotation can hide a wrong identity.
 TEST_F(PositionerOutlierRejection, FixesHaveErrorsBelow20MmDespiteMisidentifiedGridLamp) {
   std::vector<Eigen::Vector3d> positions_m;
@@ -201,34 +183,6 @@ TEST_F(PositionerOutlierRejection, FixesHaveErrorsBelow20MmDespiteMisidentifiedG
     EXPECT_LT((fix.state.pose.position_m - rig.camera.position_m).norm(), 0.02) << i;
   }
   EXPECT_GT(fixes, 1500);
-}
-
-/// A cluster of lamps and a distant wrong one, which slightly rotates and scales the others.
-TEST_F(PositionerOutlierRejection, RejectsMisidentifiedLampFarFromClusterOrReturnsNoFix) {
-  rig.map =
-      make_lamp_map({{0, 0, 2.5}, {0.1, 0, 2.5}, {0, 0.1, 2.5}, {1.5, 0, 2.5}, {0, 1.5, 2.5}});
-  rig.camera = {{0.3, 0.2, 0}, 0};
-  for (const bool stated : {true, false}) {
-    auto detections = seen(4);
-    detections[3].lamp = 5;
-    for (Detection& detection : detections) {
-      if (!stated) detection.sigma_px.reset();
-    }
-    const Fix fix = locate(detections);
-    EXPECT_TRUE(!fix.has_succeeded() || fix.rejected_ids[0] == 5) << fix.residual_px << " px";
-  }
-}
-
-TEST_F(PositionerOutlierRejection, ReturnsMirroredMapForMirroredNearlyCollinearLamps) {
-  for (const double width_m : {0.1, 0.15, 0.3}) {
-    rig.map = make_lamp_map({{0, 0, 2.5}, {0.6, width_m, 2.5}, {1.2, 0, 2.5}, {1.8, width_m, 2.5}});
-    rig.camera = {{0.9, 0, 0}, 0.4};
-    const auto detections = seen(4);
-    SyntheticRig mirrored_rig = rig;
-    for (Lamp& lamp : mirrored_rig.map.lamps) lamp.position_m.y() *= -1;
-    const Fix fix = Positioner(mirrored_rig.map, rig.calibration).compute_position_fix(detections);
-    EXPECT_EQ(fix.status, FixStatus::mirrored_map) << width_m << fix_status_name(fix.status);
-  }
 }
 
 TEST_F(PositionerOutlierRejection, ReturnsInconsistentWhenHalfOfLampsAreDisplaced) {

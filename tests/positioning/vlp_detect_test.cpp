@@ -241,14 +241,7 @@ std::vector<Level> pixels(int width, int height, int row, Next&& next) {
 TEST(CFunctionVlpDetect, ReturnsOkForRandomImagesOfAnySize) {
   Random random(1);
   for (const Readout readout : {Readout::rows, Readout::columns}) {
-    for (const auto& [width, height] : {std::array{1, 1},
-                                        {2, 100},
-                                        {100, 2},
-                                        {1, 700},
-                                        {65, 3},
-                                        {64, 64},
-                                        {127, 129},
-                                        {300, 200}}) {
+    for (const auto& [width, height] : {std::array{1, 1}, {2, 100}, {65, 3}, {127, 129}}) {
       Calibration small = calibration();
       small.camera.imager_px = {width, height};
       small.camera.readout = readout;

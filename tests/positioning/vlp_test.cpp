@@ -55,10 +55,14 @@ class CInterface : public testing::Test {
     write_lamp_map(lamps, rig.map);
     write_calibration(calibration, rig.calibration);
     Random random(1);
-    seen = with_noise(seen_from(rig, 0.1), random);
-    for (const Detection& detection : seen) {
-      given.push_back({detection.lamp, detection.pixel.x(), detection.pixel.y(),
-                       detection.sigma_px.value_or(0)});
+    see(with_noise(seen_from(rig, 0.1), random));
+  }
+  /// Sets the detections of both APIs.
+  void see(const std::vector<Detection>& detections) {
+    seen = detections;
+    given.clear();
+    for (const auto& [lamp, pixel, sigma_px] : seen) {
+      given.push_back({lamp, pixel.x(), pixel.y(), sigma_px.value_or(0)});
     }
   }
 
@@ -110,10 +114,7 @@ void expect_same(const vlp_fix& c, const Fix& fix) {
 
 TEST_F(CInterface, VlpLocateEqualsCppFixForStandingCamera) {
   rig.body.motion = {};
-  seen = seen_from(rig, 0.1);
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    given[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(), 0.1};
-  }
+  see(seen_from(rig, 0.1));
   const auto positioner = open();
   expect_same(located(positioner.get(), nullptr), rig.positioner().compute_position_fix(seen));
   const vlp_fix fix = located(positioner.get(), nullptr);
@@ -152,12 +153,10 @@ TEST_F(CInterface, VlpLocateEqualsCppFixForMovingTiltedRobot) {
 
 TEST_F(CInterface, VlpLocateAppliesSigmaAndResidualLimitOptions) {
   rig.body.motion = {};
-  seen = seen_from(rig, 0.1);
-  seen[1].pixel.x() += 4;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    given[i] = {seen[i].lamp, seen[i].pixel.x(), seen[i].pixel.y(), 0};
-    seen[i].sigma_px.reset();
-  }
+  auto displaced = seen_from(rig, 0.1);
+  displaced[1].pixel.x() += 4;
+  for (Detection& detection : displaced) detection.sigma_px.reset();
+  see(displaced);
   vlp_options options = {};
   options.unstated_sigma_px = 3;
   const vlp_fix fix = located(open(&options).get(), nullptr);
@@ -229,12 +228,10 @@ TEST_F(CInterface, VlpProjectEqualsCppProjection) {
 
 TEST_F(CInterface, VlpComputeResidualsEqualsCppResiduals) {
   rig.body.motion = {};
-  seen = seen_from(rig, 0.1);
-  seen[1].pixel.x() += 30;
-  seen.push_back({9999, {100, 100}, 0.1});
-  given.clear();
-  for (const Detection& one : seen)
-    given.push_back({one.lamp, one.pixel.x(), one.pixel.y(), *one.sigma_px});
+  auto displaced = seen_from(rig, 0.1);
+  displaced[1].pixel.x() += 30;
+  displaced.push_back({9999, {100, 100}, 0.1});
+  see(displaced);
   const auto positioner = open();
   const vlp_fix fix = located(positioner.get(), nullptr);
   ASSERT_EQ(fix.status, VLP_OK);
@@ -288,11 +285,9 @@ TEST_F(CInterface, VlpLocateEqualsCppFixWithCorrelatedPrior) {
 
 TEST_F(CInterface, VlpLocateListsCandidatesOfAmbiguousFix) {
   rig.body.motion = {{0, 0}, 0, {0.3, -0.2}};
-  seen = seen_from(rig, 0.1);
-  seen.resize(3);
-  given.clear();
-  for (const Detection& one : seen)
-    given.push_back({one.lamp, one.pixel.x(), one.pixel.y(), *one.sigma_px});
+  auto three = seen_from(rig, 0.1);
+  three.resize(3);
+  see(three);
   vlp_sensors sensors = {};
   sensors.inclination_sigma_rad = 1;
   Sensors same;
@@ -323,16 +318,10 @@ TEST_F(CInterface, VlpLocateWithEarlierEqualsCppFix) {
   Sensors same;
   same.motion = KnownMotion{{0, 0}, 0, 1, 0};
   rig.body.motion.velocity_m_per_s.setZero();
-  const std::vector<Detection> before = seen_from(rig, 0.1);
-  std::vector<vlp_detection> given_before;
-  for (const Detection& one : before) {
-    given_before.push_back({one.lamp, one.pixel.x(), one.pixel.y(), *one.sigma_px});
-  }
-  seen = before;
-  given = given_before;
+  see(seen_from(rig, 0.1));
   sensors.inclination_sigma_rad = same.inclination_sigma_rad = 0.2;
-  const EarlierFrame frame{before, 0.05};
-  const vlp_earlier_frame given_frame{given_before.data(), given_before.size(), 0.05};
+  const EarlierFrame frame{seen, 0.05};
+  const vlp_earlier_frame given_frame{given.data(), given.size(), 0.05};
   const Handle positioner = open();
   vlp_fix fix;
   ASSERT_EQ(vlp_locate_with_earlier(positioner.get(), given.data(), given.size(), &sensors,
@@ -360,29 +349,6 @@ TEST_F(CInterface, VlpLocateWithEarlierRejectsNullOrTooManyDetections) {
   EXPECT_EQ(vlp_locate_with_earlier(positioner.get(), given.data(), given.size(), nullptr, &largest,
                                     1, &fix),
             VLP_DUPLICATE_LAMP);
-}
-
-TEST_F(CInterface, VlpLocateEqualsCppFixWithKnownHeight) {
-  vlp_sensors sensors = {};
-  sensors.inclination_sigma_rad = 0.2;
-  sensors.has_motion = sensors.has_height = 1;
-  sensors.velocity_sd_m_per_s = 1;
-  sensors.z_sd_m = 1e-4;
-  Sensors same;
-  same.inclination_sigma_rad = 0.2;
-  same.motion = KnownMotion{{0, 0}, 0, 1, 0};
-  same.height = KnownHeight{0, 1e-4};
-  const vlp_fix fix = located(open().get(), &sensors);
-  expect_same(fix, rig.positioner().compute_position_fix(seen, same));
-  EXPECT_LE(std::sqrt(Covariance(fix.noise_covariance)(2, 2)), 1e-4);
-}
-
-TEST_F(CInterface, VlpLocateReturnsNotFiniteForHeightWithoutSd) {
-  vlp_sensors sensors = {};
-  sensors.has_height = 1;
-  EXPECT_EQ(located(open().get(), &sensors).status, VLP_NOT_FINITE);
-  EXPECT_THAT(vlp_describe_status(VLP_NOT_FINITE),
-              HasSubstr("that of a known height is not positive"));
 }
 
 TEST_F(CInterface, VlpLocateReturnsStampAndUnknownLampsWithoutFix) {
