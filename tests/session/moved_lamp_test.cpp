@@ -128,21 +128,6 @@ TEST_F(MovedLamp, NoStepWarnsOfLampWhenMapIsCorrect) {
   }
 }
 
-TEST_F(MovedLamp, AdjustmentReplacesCovarianceOfLens) {
-  take_captures({0, 0});
-  Calibration with_report = camera;
-  with_report.intrinsics_report =
-      IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, lens_covariance(camera.camera, 0.1, 8)};
-  const AdjustStepResult result = run_joint_adjustment_step(
-      {{{"check", check, {}}}, map, kFile, with_report, "camera.yaml", 1e-3, {}}, {});
-  ASSERT_TRUE(result.has_succeeded()) << result.message;
-  const auto& report = result.calibration.intrinsics_report;
-  ASSERT_TRUE(report && report->covariance && result.calibration.covariance);
-  const Eigen::Index count = report->covariance->rows();
-  EXPECT_EQ(count, with_report.intrinsics_report->covariance->rows());
-  EXPECT_EQ(*report->covariance, result.calibration.covariance->matrix.topLeftCorner(count, count));
-}
-
 TEST_F(MovedLamp, AdjustmentWarnsOfSetThatIsNoRotationInPlace) {
   take_captures({0, 0});
   const AdjustStepResult result = run_joint_adjustment_step(

@@ -42,14 +42,6 @@ TEST(RunLensCalibrationStep, ProposesWiderSplineGridWhenGridIsTooNarrow) {
               HasSubstr(": use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny="));
 }
 
-TEST(RunLensCalibrationStep, ProposesMoreGridRowsForVerticalFieldOfView) {
-  const LensResult result = solve_with_grid({3, 12, 5, 230});
-  ASSERT_FALSE(result.has_succeeded());
-  EXPECT_THAT(result.message,
-              testing::ContainsRegex(
-                  "use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny=10_fov_x_deg=230"));
-}
-
 TEST(RunLensCalibrationStep, ProposesSolvableGridWhenGridIsTooWide) {
   constexpr std::size_t count = 12;
   constexpr double noise_px = 0.02;

@@ -113,22 +113,6 @@ TEST_F(RunCalibrationSessionWithBoards, ChecksDefaultGatesOfLens) {
   }
 }
 
-TEST_F(RunCalibrationSessionWithBoards, RunsLensAgainIfOptionsOfCameraChange) {
-  run();
-  options.lens_model = LensModel::fisheye;
-  options.frontend.readout = Readout::rows;
-  const SessionResult fisheye = run();
-  EXPECT_EQ(list_executed_steps(fisheye), list_steps(fisheye));
-  EXPECT_EQ(read_lens().camera.lens_model, LensModel::fisheye);
-  EXPECT_FALSE(has_result("lens.cameramodel")) << "not a model of mrcal";
-  fs::remove(session_file("boards/0011.png"));
-  EXPECT_EQ(list_executed_steps(run()), list_steps(fisheye));
-  const auto& report = read_lens().intrinsics_report;
-  ASSERT_TRUE(report);
-  EXPECT_EQ(report->views, 11);
-  EXPECT_THAT(read_lens_options(), HasSubstr(" --readout rows "));
-}
-
 TEST_F(RunCalibrationSessionWithBoards, NotesSelectedLensModel) {
   options.choose_lens_model = true;
   options.frontend.readout = Readout::columns;
@@ -139,16 +123,6 @@ TEST_F(RunCalibrationSessionWithBoards, NotesSelectedLensModel) {
   EXPECT_EQ(read_lens_options(),
             "--camera-id unit-8 --row-time-s 3e-05 --readout columns --lens auto");
   EXPECT_TRUE(has_result("lens.cameramodel"));
-}
-
-TEST_F(RunCalibrationSessionWithBoards, WarnsOfContradictedRowTimeOption) {
-  options.frontend.row_time_s = 3.1e-5;
-  const SessionResult result = run();
-  for (const char* step : {"rotation", "dispersion"}) {
-    EXPECT_THAT(find_step(result, step).result.warnings,
-                Contains(HasSubstr("row time is 31 us in --row-time-s, but the stripes of")))
-        << step;
-  }
 }
 
 }  // namespace

@@ -68,19 +68,5 @@ TEST_F(RunCalibrationSessionWithClassifier, RunsStepsWithLampsAgainIfClassifierC
               ElementsAre("rotation", "dispersion", "check", "evaluate"));
 }
 
-TEST_F(RunCalibrationSessionWithClassifier, RejectsRequestForStepRowTime) {
-  options.steps_to_redo = {"row-time"};
-  EXPECT_THAT([&] { run(); }, testing::ThrowsMessage<std::invalid_argument>(
-                                  HasSubstr("or there is a classifier; leave it out of --redo")));
-}
-
-TEST_F(RunCalibrationSessionWithClassifier, DoesNotExplainFailureByRowTime) {
-  write_camera(3.3e-5);
-  keep_captures("rotation", 2);
-  const SessionResult result = run();
-  EXPECT_EQ(result.verdict, Verdict::invalid);
-  EXPECT_THAT(result.reason, Not(HasSubstr("row time is")));
-}
-
 }  // namespace
 }  // namespace vlp

@@ -114,52 +114,6 @@ TEST(SequentialCalibration, JointCovarianceWithLensPredictsChangeOfZenithAndOffs
   EXPECT_LT((offset - offset_said).norm(), 0.02 * zenith.norm());
 }
 
-TEST(RunDispersionCalibrationStep, OffsetIsIndependentOfZenithWithUnknownErrors) {
-  Random random(5);
-  const CalibrationChain chain(random, 0.1);
-  LampCaptures leveled = chain.turns;
-  leveled.calibration = chain.calibrated();
-  leveled.calibration.covariance.reset();
-  const DispersionResult dispersion = run_dispersion_calibration_step(
-      leveled, chain.known, DispersionMethod::camera, DispersionCircle::mean, {});
-  ASSERT_TRUE(dispersion.has_succeeded() && dispersion.calibration.covariance);
-  EXPECT_TRUE(dispersion.calibration.covariance->find_row(kOffsetParameter));
-  EXPECT_FALSE(dispersion.calibration.covariance->find_row(kZenithParameter) ||
-               dispersion.calibration.covariance->find_row("fx"));
-}
-
-/// Rotations at yaws that barely determine the circles. A lens error changes the set of determined
-/// circles, which moves their mean by up to 14 times the effect of the error itself.
-TEST(RunRotationCalibrationStep, CircleMethodErrorFromLensIsWithin70PercentOfAxisMethod) {
-  constexpr double spread_rad = 6e-4;  // a few times what the noise turns a lamp by
-  for (const unsigned seed : {44U, 127U, 144U, 223U, 227U}) {
-    Random random(seed);
-    Survey survey(kExactMap_m);
-    for (int k = 0; k < 6; ++k) {
-      survey.stand({{0.1, -0.05, 0}, k % 2 * M_PI + random.uniform(-spread_rad, spread_rad)});
-    }
-    Calibration& calibration = survey.input.calibration;
-    const Eigen::MatrixXd covariance = lens_covariance(calibration.camera, 1, 8);
-    calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 1, {}, {}, covariance};
-    survey.add_noise(random, true, false, false);
-    LampCaptures turn{{}, survey.truth.map, "lamps.yaml", calibration};
-    for (const auto& capture : survey.input.captures) {
-      turn.frames.push_back({capture.name, capture.detections});
-    }
-    const RotationResult circle = run_rotation_calibration_step(turn, RotationMethod::circle, {});
-    const RotationResult axis = run_rotation_calibration_step(turn, RotationMethod::axis, {});
-    ASSERT_TRUE(axis.has_succeeded());
-    ASSERT_TRUE(circle.has_succeeded());
-    const auto compute_sd = [&](const RotationResult& result) {
-      const JointCovariance& joint = result.calibration.covariance.value();
-      const MatrixX jacobian = derivative_by_lens(joint, kZenithParameter, covariance.rows());
-      return std::sqrt((jacobian * covariance * jacobian.transpose()).trace());
-    };
-    EXPECT_LT(compute_sd(circle), 1.7 * compute_sd(axis)) << seed;
-    EXPECT_GT(compute_sd(circle), 0.3 * compute_sd(axis)) << seed;
-  }
-}
-
 /// Tilt calibration from the lamps of a drive.
 TEST(RunTiltCalibrationStep, JointCovarianceWithLensPredictsChangeOfZenith) {
   Random random(4);
