@@ -3,8 +3,8 @@
 /// vlp-simulate --archive as its users call it.
 #include <set>
 
-#include "captures/csv_reader.h"
 #include "small_simulation.h"
+#include "support/csv_cells.h"
 
 namespace vlp {
 namespace {
@@ -31,7 +31,7 @@ class VlpSimulateArchive : public SmallSimulation {
   }
 };
 
-TEST_F(VlpSimulateArchive, KeepsFilesOfExistingSessionsWhenExtended) {
+TEST_F(VlpSimulateArchive, RendersOnlyMissingSessionsWhenExtendedOrInterrupted) {
   const Files four = archive(4), ten = archive(10);
   for (const auto& [name, content] : four) {
     if (name != "archive.csv") {
@@ -40,12 +40,6 @@ TEST_F(VlpSimulateArchive, KeepsFilesOfExistingSessionsWhenExtended) {
   }
   EXPECT_TRUE(ten.at("archive.csv").starts_with(four.at("archive.csv")));
   EXPECT_GT(ten.size(), 2 * four.size());
-  fs::remove_all(output);
-  EXPECT_TRUE(archive(10, "--threads 3") == ten);
-}
-
-TEST_F(VlpSimulateArchive, RendersOnlyMissingSessionsAfterInterruption) {
-  const Files expected = archive(10);
   // As a run leaves it that is killed after it damaged session 6 and before that was in its place.
   for (const char* session : {"camera-00003/session-02", "camera-00001/session-01"}) {
     std::string name = session;
@@ -54,9 +48,9 @@ TEST_F(VlpSimulateArchive, RendersOnlyMissingSessionsAfterInterruption) {
     fs::rename(output / session, output / ".unfinished" / name);
   }
   fs::remove(output / ".unfinished/camera-00001-session-01/boards/0001.png");
-  EXPECT_EQ(simulate("--archive 10").output,
+  EXPECT_EQ(simulate("--archive 10 --threads 3").output,
             "rendered 2 sessions, 8 existed; in " + output.string() + "\n");
-  EXPECT_TRUE(files_below(output) == expected);
+  EXPECT_TRUE(files_below(output) == ten);
 }
 
 TEST_F(VlpSimulateArchive, DamagesSessionsAsListedInTable) {
@@ -65,9 +59,7 @@ TEST_F(VlpSimulateArchive, DamagesSessionsAsListedInTable) {
   ASSERT_EQ(table.num_rows(), 32U);
   std::set<std::string> kinds;
   for (std::size_t row = 0; row < table.num_rows(); ++row) {
-    const auto cell = [&](const char* column) {
-      return std::string(table.get_cell_text(row, table.get_required_column(column)));
-    };
+    const auto cell = [&](const char* column) { return read_text(table, row, column); };
     const fs::path session = output / cell("camera") / cell("session");
     const fs::path target = session / cell("damaged");
     const std::string damage = cell("damage"), cut = session / "rotation/0000.png";
@@ -88,15 +80,6 @@ TEST_F(VlpSimulateArchive, DamagesSessionsAsListedInTable) {
     }
   }
   EXPECT_EQ(kinds.size(), 5U) << "four kinds and none";
-}
-
-TEST_F(VlpSimulateArchive, RejectsArchiveCombinedWithOnlyOptionAndSceneWithoutArchiveKey) {
-  EXPECT_THAT(simulate("--archive 2 --only boards").errors, HasSubstr("--only"));
-  change_scene("archive: {", "# {");
-  const auto result = simulate("--archive 2");
-  EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, HasSubstr("the scene has no key 'archive'"));
-  EXPECT_FALSE(fs::exists(output));
 }
 
 }  // namespace

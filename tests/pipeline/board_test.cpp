@@ -3,7 +3,6 @@
 /// vlp-board end to end.
 #include <gmock/gmock.h>
 
-#include <filesystem>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -14,9 +13,6 @@
 
 namespace vlp {
 namespace {
-
-namespace fs = std::filesystem;
-using testing::HasSubstr;
 
 class VlpBoard : public testing::Test {
  protected:
@@ -36,32 +32,32 @@ TEST_F(VlpBoard, WritesIdenticalPdfTwiceAndMatchingBoardFile) {
   EXPECT_EQ(TemporaryFolder::read_content(pdf), bytes);
 }
 
-TEST_F(VlpBoard, PrintsTagsToScale) {
+TEST_F(VlpBoard, PrintsEachKindOfBoardToScale) {
   if (run_program("command -v pdftoppm").exit_code != 0) GTEST_SKIP() << "no pdftoppm here";
-  const std::string pdf = (folder / "board.pdf").string();
-  ASSERT_EQ(run_program("vlp-board -o " + pdf).exit_code, 0);
-  constexpr double px_per_mm = 10;  // 254 dpi
-  ASSERT_EQ(run_program("pdftoppm -r 254 -gray -singlefile -png " + pdf + " " +
-                        (folder / "page").string())
-                .exit_code,
-            0);
-  const cv::Mat page = cv::imread((folder / "page.png").string(), cv::IMREAD_GRAYSCALE);
-  EXPECT_NEAR(page.cols, 297 * px_per_mm, 2);
-  const Board board = read_board(folder / "board.yaml");
-  const BoardDetection seen = BoardDetector(board).detect_board(page);
-  ASSERT_EQ(seen.tags.size(), 30U);
-  const double width_px = (seen.tags[5].corners_px[2] - seen.tags[0].corners_px[3]).norm();
-  EXPECT_NEAR(width_px / px_per_mm / 1000, compute_tag_field_size_m(board).x(), 1e-4);
-}
-
-TEST_F(VlpBoard, RejectsTooLargeBoardUnknownPaperAndTooHighIds) {
-  const std::string output = " -o " + (folder / "board.pdf").string();
-  const auto large = run_program("vlp-board --tag-mm 50" + output);
-  EXPECT_EQ(large.exit_code, 2);
-  EXPECT_THAT(large.errors, HasSubstr("does not fit on A4"));
-  EXPECT_EQ(run_program("vlp-board --paper B5" + output).exit_code, 2);
-  EXPECT_EQ(run_program("vlp-board --first-id 580" + output).exit_code, 2);
-  EXPECT_FALSE(fs::exists(folder / "board.pdf"));
+  constexpr double px_per_m = 10000;  // 254 dpi
+  const std::string page = (folder / "page").string();
+  for (const std::string options :
+       {"", "--charuco --dictionary DICT_4X4_50", "--chessboard --square-mm 20"}) {
+    SCOPED_TRACE(options);
+    ASSERT_EQ(run_program("vlp-board " + options + " -o " + page + ".pdf").exit_code, 0);
+    ASSERT_EQ(
+        run_program("pdftoppm -r 254 -gray -singlefile -png " + page + ".pdf " + page).exit_code,
+        0);
+    const Board board = read_board(page + ".yaml");
+    const cv::Mat image = cv::imread(page + ".png", cv::IMREAD_GRAYSCALE);
+    EXPECT_NEAR(image.cols, 0.297 * px_per_m, 2);
+    const BoardDetection seen = BoardDetector(board).detect_board(image);
+    if (board.kind == BoardKind::apriltags) {
+      ASSERT_EQ(seen.tags.size(), 30U);
+      const double width_px = (seen.tags[5].corners_px[2] - seen.tags[0].corners_px[3]).norm();
+      EXPECT_NEAR(width_px / px_per_m, compute_tag_field_size_m(board).x(), 1e-4);
+    } else {
+      ASSERT_EQ(seen.points.size(), static_cast<std::size_t>((board.cols - 1) * (board.rows - 1)));
+      const auto last = static_cast<std::size_t>(board.cols - 2);
+      const double width_px = (seen.points[last].pixel - seen.points[0].pixel).norm();
+      EXPECT_NEAR(width_px / px_per_m, (board.cols - 2) * board.square_size_m, 1e-4);
+    }
+  }
 }
 
 }  // namespace

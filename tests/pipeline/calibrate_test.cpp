@@ -4,7 +4,6 @@
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 
-#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <map>
@@ -24,7 +23,6 @@ namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
-using testing::ContainsRegex;
 using testing::HasSubstr;
 using testing::Not;
 
@@ -84,31 +82,6 @@ TEST_P(VlpCalibrateAccuracy, RenderedSessionPassesGatesOfItsDataset) {
 INSTANTIATE_TEST_SUITE_P(Rigs, VlpCalibrateAccuracy,
                          testing::Values("paper-rig", "paper-rig-faulty"));
 
-/// The fixes at the dispersion's place reject different lamps, so that no offset explains them.
-TEST_F(VlpCalibrate, ReportsMovedLampInSeveralSteps) {
-  render(kDatasets + "paper-rig/scene.yaml", "rotation,dispersion,check");
-  Calibration known;
-  known.camera = read_calibration(folder / "a session/true_calibration.yaml").camera;
-  write_calibration(folder / "a session/camera.yaml", known);
-  const std::string lamps = TemporaryFolder::read_content(folder / "a session/lamps.yaml");
-  const auto expect_lines = [&](const std::string& moved_to, const std::string& line) {
-    folder.file("a session/lamps.yaml",
-                std::regex_replace(lamps, std::regex("\\[0, -0.32, 1.6\\]"), moved_to));
-    const std::string errors = calibrate("--no-report").errors;
-    std::size_t count = 0;
-    for (auto at = errors.find(line); at != std::string::npos; at = errors.find(line, at + 1)) {
-      ++count;
-    }
-    EXPECT_GE(count, 2U) << "rotation, dispersion, and check unless dispersion fails";
-    EXPECT_THAT(errors, Not(HasSubstr("no offset explains")));
-    EXPECT_THAT(result("junit.xml"), HasSubstr(line));
-  };
-  expect_lines("[-0.03, -0.32, 1.6]",
-               "lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm)");
-  expect_lines("[0, -0.35, 1.6]",
-               "lamp 2 hangs 30 mm from where the map has it (x +0 mm, y +30 mm)");
-}
-
 // From boards that are seen beyond 90 degrees off the axis.
 TEST_F(VlpCalibrate, Calibrates190DegreeLensWithinTenthOfPixel) {
   std::string scene = TemporaryFolder::read_content(kDatasets + "fisheye/scene.yaml");
@@ -165,49 +138,14 @@ class VlpCalibrateSmallSession : public VlpCalibrate {
   }
 };
 
-TEST_F(VlpCalibrate, RunsOnlyStepsWhoseInputChanged) {
-  // Stripes enough to find the row time; fewer check captures than the scene has.
-  std::string scene = TemporaryFolder::read_content(kDatasets + "paper-rig/scene.yaml");
-  const std::string grid = "columns: 6, rows: 6}\n    heights_m: [0, 0.1, 0.2, 0.3]";
-  ASSERT_NE(scene.find(grid), std::string::npos);
-  scene.replace(scene.find(grid), grid.size(), "columns: 3, rows: 2}\n    heights_m: [0]");
-  render(folder.file("scene.yaml", scene).string(), "boards,rotation,dispersion,check,line-x");
-  const auto first = calibrate("--readout rows");  // and finds the row time
-  ASSERT_EQ(first.exit_code, 0) << first.output << first.errors;
-  EXPECT_THAT(first.output, Not(HasSubstr("up to date")));
-  EXPECT_THAT(first.output, HasSubstr("row-time"));
-  EXPECT_THAT(result("report.html"), HasSubstr("line-x-fixes.csv"));
-  const std::string calibration = result("calibration.yaml"), report = result("report.html");
-
-  const auto again = calibrate("--readout rows");
-  EXPECT_EQ(again.exit_code, 0);
-  EXPECT_THAT(again.output, Not(ContainsRegex("[0-9] s\n"))) << "a step was run again";
-  EXPECT_EQ(result("report.html"), report);
-
-  // A step that something ended in the middle left nothing that says how it ended.
-  fs::remove(folder / "results/steps/rotation.json");
-  // And a capture less in check.
-  fs::remove(folder / "a session/check/0000.png");
-  const auto changed = calibrate("--readout rows");
-  EXPECT_EQ(changed.exit_code, 0) << changed.output << changed.errors;
-  EXPECT_THAT(changed.output, HasSubstr("lens          up to date"));
-  EXPECT_THAT(changed.output, Not(HasSubstr("rotation      up to date")));
-  EXPECT_THAT(changed.output,
-              HasSubstr("dispersion    up to date"));  // its input has the same bytes
-  EXPECT_THAT(changed.output, Not(HasSubstr("check         up to date")));
-  EXPECT_EQ(result("calibration.yaml"), calibration);
-  EXPECT_THAT(result("evaluation.json"), HasSubstr("\"missing\""));
-}
-
-TEST_F(VlpCalibrateSmallSession, ReportsFailedGatesAgainWhenRepeated) {
+TEST_F(VlpCalibrateSmallSession, ExitsWith1AndWritesReportWhenGatesFail) {
   folder.file("a session/gates.yaml",
               "format: vlp-gates/1\ngates:\n  mean_mm: 1e-6\n  tilt_deg: 1e-6\n");
-  for (int run = 0; run < 2; ++run) {
-    const auto result = calibrate();
-    EXPECT_EQ(result.exit_code, 1) << result.output << result.errors;
-    EXPECT_THAT(result.output, HasSubstr("a gate is not met"));
-    EXPECT_THAT(result.output, HasSubstr("NOT MET     mean_mm is "));
-    EXPECT_THAT(result.output, HasSubstr("NOT MET     tilt_deg is "));
+  const auto failed = calibrate();
+  EXPECT_EQ(failed.exit_code, 1) << failed.output << failed.errors;
+  for (const char* line :
+       {"a gate is not met", "NOT MET     mean_mm is ", "NOT MET     tilt_deg is "}) {
+    EXPECT_THAT(failed.output, HasSubstr(line));
   }
   EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
   EXPECT_THAT(result("junit.xml"),
@@ -218,10 +156,6 @@ TEST_F(VlpCalibrateSmallSession, ReportsFailedGatesAgainWhenRepeated) {
   const auto passed = calibrate();
   EXPECT_EQ(passed.exit_code, 0) << passed.output << passed.errors;
   EXPECT_THAT(passed.output, HasSubstr("rotation      up to date"));
-  folder.file("a session/gates.yaml", "format: vlp-gates/1\ngates:\n  coverage: 7\n");
-  const auto refused = calibrate();
-  EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_THAT(refused.errors, HasSubstr("gates.yaml:3: gates.coverage: should be a fraction"));
 }
 
 TEST_F(VlpCalibrateSmallSession, BatchStdinWritesSameResultsAsSingleRun) {
@@ -250,75 +184,7 @@ TEST_F(VlpCalibrateSmallSession, BatchStdinWritesSameResultsAsSingleRun) {
   }
 }
 
-TEST_F(VlpCalibrateSmallSession, UpdatesResultsWhenSessionFilesChange) {
-  ASSERT_EQ(calibrate().exit_code, 0);
-  const std::string calibration = result("calibration.yaml");
-  // Without the dispersion nothing of it is left, and with it again all is as it was.
-  fs::rename(folder / "a session/dispersion", folder / "kept");
-  ASSERT_EQ(calibrate().exit_code, 0);
-  EXPECT_EQ(result("calibration.yaml"), result("rotated.yaml"));
-  EXPECT_FALSE(fs::exists(folder / "results/dispersion.svg"));
-  fs::rename(folder / "kept", folder / "a session/dispersion");
-  ASSERT_EQ(calibrate().exit_code, 0);
-  EXPECT_EQ(result("calibration.yaml"), calibration);
-  // A camera that is known already, and then is not.
-  fs::copy(folder / "a session/true_calibration.yaml", folder / "a session/camera.yaml");
-  const auto known = calibrate();
-  ASSERT_EQ(known.exit_code, 0) << known.errors;
-  EXPECT_THAT(
-      known.errors,
-      HasSubstr(
-          "camera.yaml takes precedence over options of the camera; ignored: row time, readout"));
-  EXPECT_THAT(calibrate("--camera-id other --lens LENSMODEL_OPENCV5").errors,
-              HasSubstr("ignored: name, lens model"));
-  EXPECT_THAT(calibrate("").errors, Not(HasSubstr("camera.yaml takes precedence")));
-  EXPECT_THAT(result("calibration.yaml"), HasSubstr("id: \"archive\""));
-  EXPECT_FALSE(fs::exists(folder / "results/lens.yaml"));
-  fs::remove(folder / "a session/camera.yaml");
-  ASSERT_EQ(calibrate().exit_code, 0);
-  EXPECT_EQ(result("calibration.yaml"), calibration);
-  // A result that somebody changed, or took away, is made again.
-  folder.file("results/rotated.yaml", "changed\n");
-  EXPECT_THAT(calibrate().output, Not(HasSubstr("rotation      up to date")));
-  EXPECT_EQ(result("calibration.yaml"), calibration);
-  fs::remove(folder / "results/rotation.svg");
-  fs::remove(folder / "results/evaluation.json");
-  ASSERT_EQ(calibrate().exit_code, 0);
-  EXPECT_TRUE(fs::exists(folder / "results/rotation.svg"));
-  EXPECT_TRUE(fs::exists(folder / "results/evaluation.json"));
-  // A drive that cannot be taken costs the report, not the calibration.
-  folder.file("a session/line-x/truth.csv", "image,x_m,y_m\n0000.png,0,0\n");
-  const auto bad_line = calibrate();
-  EXPECT_EQ(bad_line.exit_code, 2);
-  EXPECT_THAT(bad_line.errors, HasSubstr("line-x/truth.csv: start and end of the drive are equal"));
-  EXPECT_EQ(result("calibration.yaml"), calibration);
-  EXPECT_FALSE(fs::exists(folder / "results/report.html"));
-}
-
-TEST_F(VlpCalibrateSmallSession, SelectsOpencvModelWithOptionLensAuto) {
-  const std::string chosen = "--row-time-s 3e-5 --readout rows --lens auto";
-  const auto run = calibrate(chosen);
-  EXPECT_LE(run.exit_code, 1) << run.errors;
-  EXPECT_THAT(run.errors, HasSubstr("lens model: LENSMODEL_OPENCV"));
-  EXPECT_THAT(result("lens.yaml"), HasSubstr("--lens auto"));
-  EXPECT_TRUE(fs::exists(folder / "results/lens.cameramodel"));
-  EXPECT_THAT(calibrate(chosen).output, HasSubstr("lens          up to date"));
-  EXPECT_THAT(calibrate().output, Not(HasSubstr("lens          up to date")));
-}
-
-TEST_F(VlpCalibrateSmallSession, ReturnsOneWhenGateOfLensFails) {
-  std::size_t views = 0;
-  for (const auto& image : fs::directory_iterator(folder / "a session/boards")) {
-    if (image.path().extension() == ".png" && ++views > 5) fs::remove(image.path());
-  }
-  const auto run = calibrate();
-  EXPECT_EQ(run.exit_code, 1) << run.output << run.errors;
-  EXPECT_THAT(run.output, HasSubstr("a gate is not met"));
-  EXPECT_THAT(result("report.html"), HasSubstr("FAIL"));
-}
-
-TEST_F(VlpCalibrateSmallSession, WritesNoCalibrationWhenRotationStepFails) {
-  ASSERT_EQ(calibrate().exit_code, 0);
+TEST_F(VlpCalibrateSmallSession, ExitsWith3AndWritesNoCalibrationWhenRotationStepFails) {
   for (const auto& image : fs::directory_iterator(folder / "a session/rotation")) {
     if (image.path().filename() != "0000.png") fs::remove(image.path());
   }
@@ -329,62 +195,12 @@ TEST_F(VlpCalibrateSmallSession, WritesNoCalibrationWhenRotationStepFails) {
   EXPECT_THAT(result("session.json"), HasSubstr("\"failure\": \"undetermined\""));
   expect_documents_as_their_schemas_say();
   EXPECT_TRUE(fs::exists(folder / "results/lens.yaml"));
-  EXPECT_FALSE(fs::exists(folder / "results/report.html")) << "of the captures before";
   EXPECT_FALSE(fs::exists(folder / "results/calibration.yaml"));
 }
 
-/// The same session through the programs of single steps, by hand.
-class SingleStepPrograms : public VlpCalibrateSmallSession {
- protected:
-  const std::string how = "--row-time-s 3e-5 --readout rows --camera-id unit";
-
-  std::string by_hand(const std::string& name) const {
-    return TemporaryFolder::read_content(folder / name);
-  }
-  static std::string without_history(const std::string& calibration) {
-    return calibration.substr(calibration.find("\ncamera:"));
-  }
-  /// `lens` comes before: the session's, or that of its boards, found here.
-  void run_steps(const std::string& lens, const std::string& truth,
-                 const std::string& options = "") const {
-    const std::string in = "'" + path("a session") + "/", out = "'" + path("");
-    const std::string lamps = " --lamps " + in + "lamps.yaml' " + options + " --calibration ";
-    for (const std::string& command :
-         {"vlp-rotation " + in + "rotation'" + lamps + lens + " -o " + out + "rotated.yaml'",
-          "vlp-dispersion " + in + "dispersion'" + lamps + out + "rotated.yaml' -o " + out +
-              "calibration.yaml'",
-          "vlp-locate " + in + "check'" + lamps + out + "calibration.yaml' -o " + out +
-              "fixes.csv'",
-          "vlp-evaluate " + out + "fixes.csv' --truth " + in + "check/" + truth +
-              "' --calibration " + out + "calibration.yaml' --json " + out + "evaluation.json'"}) {
-      const auto run = run_program(command);
-      ASSERT_EQ(run.exit_code, 0) << command << run.errors;
-    }
-  }
-  std::string lens_by_hand() const {
-    const std::string in = "'" + path("a session") + "/", lens = "'" + path("lens.yaml'");
-    const auto run = run_program("vlp-intrinsics " + in + "boards' --board " + in + "board.yaml' " +
-                                 how + " -o " + lens);
-    EXPECT_EQ(run.exit_code, 0) << run.errors;
-    return lens;
-  }
-  void expect_same_results() const {
-    EXPECT_EQ(by_hand("fixes.csv"), result("check-fixes.csv"));
-    EXPECT_EQ(by_hand("evaluation.json"), result("evaluation.json"));
-    EXPECT_EQ(without_history(by_hand("calibration.yaml")),
-              without_history(result("calibration.yaml")));
-  }
-};
-
-TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrate) {
-  ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
-  run_steps(lens_by_hand(), "truth.csv");
-  expect_same_results();
-  EXPECT_EQ(by_hand("lens.cameramodel"), result("lens.cameramodel"));
-}
-
-TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrateWithInclinationSensor) {
-  // One that reads a little, and a table of places without truth.csv.
+/// The same session through the programs of single steps, with an inclination sensor and a table of
+/// places without truth.csv.
+TEST_F(VlpCalibrateSmallSession, SingleStepProgramsWriteSameResultsAsVlpCalibrate) {
   std::string captures = "image,x_m,y_m,z_m,roll_rad,pitch_rad\n";
   for (const TruthRow& row : read_truth_table(folder / "a session/check/truth.csv")) {
     captures +=
@@ -392,54 +208,35 @@ TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrateWithInclinationSensor) 
   }
   fs::remove(folder / "a session/check/truth.csv");
   folder.file("a session/check/captures.csv", captures);
+  const std::string how = "--row-time-s 3e-5 --readout rows --camera-id unit";
   ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
-  run_steps(lens_by_hand(), "captures.csv");
-  expect_same_results();
-  // The inclination counts: without it the fixes are others.
-  folder.file("a session/check/captures.csv",
-              std::regex_replace(captures, std::regex("0.001,-0.002"), "0,0"));
-  ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
-  EXPECT_NE(by_hand("fixes.csv"), result("check-fixes.csv"));
-}
-
-TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrateWithGivenLens) {
-  fs::copy(folder / "a session/true_calibration.yaml", folder / "a session/camera.yaml");
-  ASSERT_EQ(calibrate("--no-report").exit_code, 0);
-  run_steps("'" + path("a session/camera.yaml'"), "truth.csv");
-  expect_same_results();
-}
-
-TEST_F(SingleStepPrograms, WriteSameResultsAsVlpCalibrateWithClassifier) {
-  const std::string in = path("a session");
-  const auto trained = run_program("vlp-train '" + in + "/rotation' --lamps '" + in +
-                                   "/lamps.yaml' --calibration '" + in +
-                                   "/true_calibration.yaml' -o '" + in + "/classifier.yaml'");
-  ASSERT_EQ(trained.exit_code, 0) << trained.errors;
-  // Only the classifier identifies the lamps.
-  const std::string map = TemporaryFolder::read_content(folder / "a session/lamps.yaml");
-  folder.file("a session/lamps.yaml",
-              std::regex_replace(map, std::regex(", frequency_hz: [0-9.e+]+"), ""));
-  ASSERT_EQ(calibrate("--no-report " + how).exit_code, 0);
-  run_steps(lens_by_hand(), "truth.csv", "--classifier '" + in + "/classifier.yaml'");
-  expect_same_results();
-}
-
-TEST_F(VlpCalibrateSmallSession, RedoOptionRunsOnlyNamedStepAgain) {
-  ASSERT_EQ(calibrate().exit_code, 0);
-  const std::string session = result("session.json");
-  const auto again = calibrate("--row-time-s 3e-5 --readout rows --redo check");
-  EXPECT_EQ(again.exit_code, 0);
-  EXPECT_THAT(again.output, HasSubstr("dispersion    up to date"));
-  EXPECT_THAT(again.output, Not(HasSubstr("check         up to date")));
-  EXPECT_THAT(again.output, HasSubstr("evaluate      up to date"));
-  EXPECT_EQ(result("session.json"), session) << "whatever was as before";
-  const auto unknown = calibrate("--redo checks");
-  EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(unknown.errors, HasSubstr("no step checks; the steps are: lens, "));
-  const auto known = calibrate("--row-time-s 3e-5 --readout rows --redo row-time");
-  EXPECT_EQ(known.exit_code, 2);
-  EXPECT_THAT(known.errors,
-              HasSubstr("there is no step row-time in this session, as the row time is known"));
+  const std::string in_folder = "cd '" + path("") + "' && S='a session' && ";
+  for (const std::string& command :
+       {"vlp-intrinsics \"$S\"/boards --board \"$S\"/board.yaml -o lens.yaml " + how,
+        std::string(
+            "vlp-rotation \"$S\"/rotation --lamps \"$S\"/lamps.yaml --calibration lens.yaml "
+            "-o rotated.yaml"),
+        std::string("vlp-dispersion \"$S\"/dispersion --lamps \"$S\"/lamps.yaml --calibration "
+                    "rotated.yaml -o calibration.yaml"),
+        std::string("vlp-locate \"$S\"/check --lamps \"$S\"/lamps.yaml --calibration "
+                    "calibration.yaml -o fixes.csv"),
+        std::string("vlp-evaluate fixes.csv --truth \"$S\"/check/captures.csv --calibration "
+                    "calibration.yaml --json evaluation.json")}) {
+    const auto run = run_program(in_folder + command);
+    ASSERT_EQ(run.exit_code, 0) << command << run.errors;
+  }
+  const auto by_hand = [&](const char* name) {
+    return TemporaryFolder::read_content(folder / name);
+  };
+  const auto without_history = [](const std::string& calibration) {
+    return calibration.substr(calibration.find("\ncamera:"));
+  };
+  EXPECT_NE(by_hand("fixes.csv"), "");
+  EXPECT_EQ(by_hand("fixes.csv"), result("check-fixes.csv"));
+  EXPECT_EQ(by_hand("evaluation.json"), result("evaluation.json"));
+  EXPECT_EQ(by_hand("lens.cameramodel"), result("lens.cameramodel"));
+  EXPECT_EQ(without_history(by_hand("calibration.yaml")),
+            without_history(result("calibration.yaml")));
 }
 
 TEST_F(VlpCalibrateSmallSession, WritesSameResultsWhenResumedAfterKill) {
@@ -465,39 +262,7 @@ TEST_F(VlpCalibrateSmallSession, WritesSameResultsWhenResumedAfterKill) {
   EXPECT_GE(killed_in_time, 1) << "a busy machine may be late for the last moments";
 }
 
-TEST_F(VlpCalibrateSmallSession, RejectsResultFolderThatContainsForeignFile) {
-  fs::create_directory(folder / "mine");
-  folder.file("mine/calibration.yaml", "of somebody\n");
-  const auto run =
-      run_program("vlp-calibrate '" + path("a session") + "' -o '" + path("mine") + "'");
-  EXPECT_EQ(run.exit_code, 2);
-  EXPECT_THAT(run.errors, HasSubstr("mine: holds calibration.yaml, which is not of vlp-calibrate"));
-  EXPECT_EQ(TemporaryFolder::read_content(folder / "mine/calibration.yaml"), "of somebody\n");
-  EXPECT_FALSE(fs::exists(folder / "mine/steps"));
-}
-
-TEST_F(VlpCalibrateSmallSession, RemovesOldResultsWhenLampMapIsMissing) {
-  ASSERT_EQ(calibrate().exit_code, 0);
-  const std::string lamps = TemporaryFolder::read_content(folder / "a session/lamps.yaml");
-  fs::remove(folder / "a session/lamps.yaml");
-  EXPECT_EQ(calibrate().exit_code, 2);
-  for (const char* name : {"calibration.yaml", "report.html", "line-x-fixes.csv", "lens.yaml"}) {
-    EXPECT_FALSE(fs::exists(folder / "results" / name)) << name;
-  }
-  EXPECT_THAT(result("session.json"), HasSubstr("\"reason\": \"lamps.yaml: is missing\""));
-  folder.file("a session/lamps.yaml", lamps);
-  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
-  // A drive's table that is cut costs the report, and is said.
-  folder.file("a session/line-x/captures.csv", "image,x_m,y_m\n0000.png,1");
-  fs::remove(folder / "a session/line-x/truth.csv");
-  const auto cut = calibrate();
-  EXPECT_EQ(cut.exit_code, 2);
-  EXPECT_THAT(cut.errors, HasSubstr("line-x: line-x/captures.csv:2"));
-  EXPECT_TRUE(fs::exists(folder / "results/calibration.yaml"));
-  EXPECT_THAT(result("session.json"), HasSubstr("\"verdict\": \"no result\""));
-}
-
-TEST_F(VlpCalibrateSmallSession, ListsDamagedImagesAsSkippedInSessionJson) {
+TEST_F(VlpCalibrateSmallSession, WritesSessionJsonWithSkippedImagesSdsAndLampOffsets) {
   folder.file("a session/rotation/0003.png", "no image");
   fs::resize_file(folder / "a session/check/0001.png", 100);
   const auto run = calibrate("--no-report --row-time-s 3e-5 --readout rows");
@@ -505,50 +270,25 @@ TEST_F(VlpCalibrateSmallSession, ListsDamagedImagesAsSkippedInSessionJson) {
   EXPECT_THAT(run.errors, HasSubstr("0003.png: cannot be read as an image: it is not PNG"));
   const auto json = nlohmann::json::parse(result("session.json"));
   std::map<std::string, std::string> skipped;
+  std::size_t lamps = 0;
   for (const auto& step : json["steps"]) {
+    if (step.contains("lamp_offsets")) lamps += step["lamp_offsets"].size();
     if (!step.contains("skipped")) continue;
     skipped[step["name"].get<std::string>()] = step["skipped"][0]["image"].get<std::string>();
   }
   EXPECT_EQ(skipped,
             (std::map<std::string, std::string>{{"rotation", "0003.png"}, {"check", "0001.png"}}));
+  EXPECT_EQ(lamps, 6);
   EXPECT_THAT(result("session.json"), Not(HasSubstr(path("")))) << "of no use elsewhere";
-  expect_documents_as_their_schemas_say();
-}
-
-TEST_F(VlpCalibrateSmallSession, WritesCalibrationSdsAndLampOffsetsToSessionJson) {
-  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
-  const auto json = nlohmann::json::parse(result("session.json"));
-  const auto& figures = json["calibration"];
   for (const char* name :
        {"focal_sd_px", "principal_point_sd_px", "zenith_sd_deg", "lever_arm_sd_mm"}) {
-    ASSERT_EQ(figures[name].size(), 2) << name;
-    for (const auto& sd : figures[name]) {
+    ASSERT_EQ(json["calibration"][name].size(), 2) << name;
+    for (const auto& sd : json["calibration"][name]) {
       EXPECT_GT(sd.get<double>(), 1e-4) << name;
       EXPECT_LT(sd.get<double>(), 1) << name;
     }
   }
-  EXPECT_NEAR(
-      std::hypot(figures["zenith_deg"][0].get<double>(), figures["zenith_deg"][1].get<double>()),
-      figures["tilt_deg"].get<double>(), 1e-3);
-  std::size_t lamps = 0;
-  for (const auto& step : json["steps"]) {
-    if (step.contains("lamp_offsets")) lamps += step["lamp_offsets"].size();
-  }
-  EXPECT_EQ(lamps, 6);
-}
-
-TEST_F(VlpCalibrateSmallSession, RejectsResultFolderOfAnotherSession) {
-  ASSERT_EQ(calibrate("--no-report --row-time-s 3e-5 --readout rows").exit_code, 0);
-  fs::copy(folder / "a session", folder / "another", fs::copy_options::recursive);
-  const auto other = run_program("vlp-calibrate '" + path("another") + "' -o '" + path("results") +
-                                 "' --row-time-s 3e-5 --readout rows");
-  EXPECT_EQ(other.exit_code, 2);
-  EXPECT_THAT(other.errors, HasSubstr("contains the results of another session"));
-  EXPECT_EQ(std::count(other.errors.begin(), other.errors.end(), '\n'), 1);
-  const auto inside =
-      run_program("vlp-calibrate '" + path("another") + "' -o '" + path("another/check") + "'");
-  EXPECT_EQ(inside.exit_code, 2);
-  EXPECT_THAT(inside.errors, HasSubstr("contains captures: choose another folder for the results"));
+  expect_documents_as_their_schemas_say();
 }
 
 TEST_F(VlpCalibrate, ErrorNamesMissingFolderFileOrUnknownOption) {

@@ -9,8 +9,8 @@
 #include <map>
 #include <utility>
 
-#include "captures/csv_reader.h"
 #include "captures/detections_table.h"
+#include "support/csv_cells.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
@@ -53,10 +53,8 @@ TEST(VlpDetectWithLedChips, LocatesAllVisibleLampsWithinQuarterPixel) {
   double squares = 0, chi_square = 0, worst_px = 0;
   int lamps = 0;
   for (std::size_t row = 0; row < truth.num_rows(); ++row) {
-    const auto number = [&](const char* name) {
-      return truth.get_cell_number(row, truth.get_required_column(name));
-    };
-    const std::string image(truth.get_cell_text(row, truth.get_required_column("image")));
+    const auto number = [&](const char* name) { return read_number(truth, row, name); };
+    const std::string image(read_text(truth, row, "image"));
     const auto lamp =
         found.find({image, truth.get_cell_integer(row, truth.get_required_column("lamp"))});
     if (number("in_view") < 1) continue;

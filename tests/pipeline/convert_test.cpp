@@ -119,14 +119,5 @@ TEST_F(VlpConvert, PrintsLargestPixelErrorOfFittedLens) {
   EXPECT_GE(worst_px, 0.95 * stated_px);
 }
 
-TEST_F(VlpConvert, RejectsLensModelThatFormatDoesNotSupport) {
-  write_calibration(folder_ / "camera.yaml", calibration_);
-  const auto result =
-      run_program("vlp-convert " + path("camera.yaml") + " --to kalibr -o " + path("out"));
-  EXPECT_EQ(result.exit_code, 2) << result.output;
-  EXPECT_THAT(result.errors, HasSubstr("use --lens LENSMODEL_OPENCV4 or OPENCV_FISHEYE"));
-  EXPECT_FALSE(std::filesystem::exists(path("out")));
-}
-
 }  // namespace
 }  // namespace vlp

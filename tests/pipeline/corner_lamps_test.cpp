@@ -11,13 +11,13 @@
 #include <set>
 
 #include "camera/lens.h"
-#include "captures/csv_reader.h"
 #include "captures/detections_table.h"
 #include "captures/fixes_table.h"
 #include "geometry/frames.h"
 #include "rig/board_layout.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
+#include "support/csv_cells.h"
 #include "support/matchers.h"
 #include "support/program.h"
 #include "support/random.h"
@@ -46,7 +46,7 @@ struct PoseOfView {
 std::map<std::string, PoseOfView> read_poses(const std::filesystem::path& file) {
   const CsvTable csv(file);
   const auto number = [&](std::size_t row, const std::string& column) {
-    return csv.get_cell_number(row, csv.get_required_column(column));
+    return read_number(csv, row, column);
   };
   const std::array<std::string, 6> names{"x", "y", "z", "rx", "ry", "rz"};
   std::map<std::string, PoseOfView> poses;
@@ -65,7 +65,7 @@ std::map<std::string, PoseOfView> read_poses(const std::filesystem::path& file) 
             number(row, "cov_" + names[i] + "_" + names[k] + unit);
       }
     }
-    poses.emplace(csv.get_cell_text(row, csv.get_required_column("image")), pose);
+    poses.emplace(read_text(csv, row, "image"), pose);
   }
   return poses;
 }
@@ -257,24 +257,6 @@ TEST_F(CornersToPoses, EstimatesSigmaOfCornersWithoutSd) {
   EXPECT_NEAR(compute_normalized_squared_error(), 1, 0.2);
 }
 
-/// The same views, with the board as a ceiling 3 m above the floor.
-TEST_F(CornersToPoses, CovarianceMatchesErrorsOfCameraThatLooksUp) {
-  see_tags(kNoise_px);
-  convert("corners.csv");
-  LampMap map = read_lamp_map(folder / "points/lamps.yaml");
-  map.lamps_below_camera = false;
-  const Eigen::Vector3d signs(1, -1, -1);
-  for (Lamp& lamp : map.lamps)
-    lamp.position_m = lamp.position_m.cwiseProduct(signs) + Eigen::Vector3d(0, 0, 3);
-  write_lamp_map(folder / "ceiling.yaml", map);
-  for (auto& [image, view] : truth) {
-    view.position_m = view.position_m.cwiseProduct(signs) + Eigen::Vector3d(0, 0, 3);
-    view.world_from_camera = signs.asDiagonal() * view.world_from_camera;
-  }
-  locate("ceiling.yaml");
-  EXPECT_NEAR(compute_normalized_squared_error(), 1, 0.16);
-}
-
 /// A fix takes at most 256 lamps; the lamps that are left are spread over the board.
 TEST_F(CornersToPoses, KeepsEveryNthCornerOfLargeBoard) {
   folder.file("board.yaml",
@@ -294,35 +276,6 @@ TEST_F(CornersToPoses, KeepsEveryNthCornerOfLargeBoard) {
   ASSERT_EQ(frames[0].detections.size(), 190U);
   EXPECT_EQ(frames[0].detections[0].lamp, 0);
   EXPECT_EQ(frames[0].detections[189].lamp, 378);
-}
-
-TEST_F(CornersToPoses, ReportsInvalidUse) {
-  see_tags(0);
-  const std::string to_lamps = " --to lamps -o " + path("points");
-  const auto expect_error = [&](const std::string& command, const std::string& words) {
-    const auto result = run_program(command);
-    EXPECT_EQ(result.exit_code, 2) << command;
-    EXPECT_THAT(result.errors, HasSubstr(words)) << command;
-  };
-  folder.file("few.csv",
-              "image,tag,corner,u_px,v_px\na.png,0,0,1,2\na.png,0,1,9,2\n"
-              "a.png,0,2,9,9\na.png,0,3,1,9\n");
-  expect_error("vlp-convert " + path("few.csv") + " --board " + path("board.yaml") + to_lamps,
-               "too few corners to estimate the sigma_px of those without sd_px; give --sigma-px");
-  expect_error("vlp-convert " + path("corners.csv") + to_lamps, "needs corners of a board");
-  expect_error("vlp-convert " + path("camera.yaml") + " --board " + path("board.yaml") + to_lamps,
-               "needs corners of a board");
-  convert("corners.csv", "--sigma-px 0.1");
-  const std::string locate_command = "vlp-locate " + path("points/detections.csv") + " --lamps " +
-                                     path("points/lamps.yaml") + " --calibration " +
-                                     path("camera.yaml") + " -o " + path("fixes.csv");
-  expect_error(locate_command + " --poses " + path("poses.csv"),
-               "--poses needs estimated roll and pitch; give --roll-pitch-sd-deg");
-  expect_error("vlp-rotation " + path("points/detections.csv") + " --lamps " +
-                   path("points/lamps.yaml") + " --calibration " + path("camera.yaml") + " -o " +
-                   path("out.yaml"),
-               "lamps_below_camera: only vlp-detect and vlp-locate support a camera that looks "
-               "down");
 }
 
 }  // namespace

@@ -3,8 +3,8 @@
 /// vlp-dispersion as its users call it.
 #include <gmock/gmock.h>
 
-#include "captures/csv_reader.h"
 #include "captures/detections_table.h"
+#include "support/csv_cells.h"
 #include "support/program.h"
 #include "support/synthetic_rig.h"
 #include "support/temporary_folder.h"
@@ -13,7 +13,6 @@ namespace vlp {
 namespace {
 
 using testing::HasSubstr;
-using testing::Not;
 
 class VlpDispersion : public testing::Test {
  protected:
@@ -68,96 +67,34 @@ TEST_F(VlpDispersion, CorrectedCalibrationYieldsExactFixAtOtherPosition) {
                   "--calibration " + path("calibration.yaml") + "-o " + path("fixes.csv"));
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const CsvTable fixes(folder / "fixes.csv");
-  EXPECT_NEAR(fixes.get_cell_number(0, fixes.get_required_column("x_m")), -0.3, 2e-6);
-  EXPECT_NEAR(fixes.get_cell_number(0, fixes.get_required_column("y_m")), 0.2, 2e-6);
-  EXPECT_NEAR(fixes.get_cell_number(0, fixes.get_required_column("z_m")), 0.25, 2e-6);
+  EXPECT_NEAR(read_number(fixes, 0, "x_m"), -0.3, 2e-6);
+  EXPECT_NEAR(read_number(fixes, 0, "y_m"), 0.2, 2e-6);
+  EXPECT_NEAR(read_number(fixes, 0, "z_m"), 0.25, 2e-6);
 }
 
 TEST_F(VlpDispersion, ReadsCapturePositionsFromCapturesCsv) {
   const auto frames = turn(6, 6.28);
   std::string table = "image,x_m,y_m\n";
-  for (const Frame& frame : frames) table += frame.image + ",0.1,-0.05\n";
-  const auto captures = folder.file("captures.csv", table).string();
-  EXPECT_EQ(dispersion(frames, "--captures " + captures).exit_code, 0);
-
-  folder.file("captures.csv", table.substr(0, table.find("5.png")));
-  const auto fewer = dispersion(frames, "--captures " + captures);
+  for (int i = 0; i < 5; ++i) table += std::to_string(i) + ".png,0.1,-0.05\n";
+  const auto fewer = dispersion(frames, "--captures " + folder.file("c.csv", table).string());
   EXPECT_EQ(fewer.exit_code, 0);
   EXPECT_THAT(fewer.errors, HasSubstr("1 of 6 captures have no position"));
-
-  folder.file("captures.csv", "image,time_s\n0.png,0\n");
-  const auto none = dispersion(frames, "--captures " + captures);
+  folder.file("c.csv", "image,time_s\n0.png,0\n");
+  const auto none = dispersion(frames, "--captures " + path("c.csv"));
   EXPECT_EQ(none.exit_code, 2);
-  EXPECT_THAT(none.errors, HasSubstr("captures.csv: no capture has a position"));
-  EXPECT_THAT(dispersion(frames, "").errors,
-              HasSubstr("the positions of the captures are unknown"));
+  EXPECT_THAT(none.errors, HasSubstr("c.csv: no capture has a position"));
 }
 
 TEST_F(VlpDispersion, RequiresOneYawForChenGuanMethodAndSeveralYawsOtherwise) {
-  const auto refused = dispersion(turn(6, 0), "--reference-point 0.1 -0.05");
+  const std::string point = "--reference-point 0.1 -0.05", paper = point + " --method chen-guan";
+  const auto refused = dispersion(turn(6, 0), point);
   EXPECT_EQ(refused.exit_code, 3);
   EXPECT_THAT(refused.errors, HasSubstr("turn the camera at the reference point"));
   EXPECT_FALSE(std::filesystem::exists(folder / "calibration.yaml"));
-  for (const std::string circle : {"", " --circle enclosing"}) {
-    const auto paper =
-        dispersion(turn(6, 0), "--reference-point 0.1 -0.05 --method chen-guan" + circle);
-    EXPECT_EQ(paper.exit_code, 0) << paper.errors;
-    EXPECT_THAT(paper.output, HasSubstr("assumed correct"));
-  }
-  EXPECT_EQ(dispersion(turn(6, 6.28), "--reference-point 0.1 -0.05 --method chen-guan").exit_code,
-            3);
-}
-
-TEST_F(VlpDispersion, ErrorNamesReferencePointLampMapOrMissingCaptures) {
-  const auto far = dispersion(turn(6, 6.28), "--reference-point 100 -50");
-  EXPECT_EQ(far.exit_code, 2);
-  EXPECT_THAT(far.errors, HasSubstr("in the frame of the lamp map, and"));
-  const auto one = dispersion(turn(1, 0), "--reference-point 0.1 -0.05");
-  EXPECT_EQ(one.exit_code, 3);
-  EXPECT_THAT(one.errors, HasSubstr("add captures"));
-  auto frames = turn(6, 6.28);
-  for (Frame& frame : frames) {
-    for (Detection& detection : frame.detections) detection.lamp += 100;
-  }
-  const auto other_map = dispersion(frames, "--reference-point 0.1 -0.05");
-  EXPECT_EQ(other_map.exit_code, 2);
-  EXPECT_THAT(other_map.errors, HasSubstr("lamps.yaml: has none of the lamps"));
-  frames = turn(6, 6.28);
-  LampMap mirrored = rig.map;
-  for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
-  write_lamp_map(folder / "lamps.yaml", mirrored);
-  const auto from_below = dispersion(frames, "--reference-point 0.1 -0.05");
-  EXPECT_EQ(from_below.exit_code, 2);
-  EXPECT_THAT(from_below.errors, HasSubstr("lamps.yaml: the lamp map seems to be mirrored"));
-  write_lamp_map(folder / "lamps.yaml", rig.map);
-  for (Frame& frame : frames) frame.detections.resize(1), frame.detections[0].lamp = 1;
-  EXPECT_EQ(dispersion(frames, "--reference-point 0.1 -0.05").exit_code, 3);
-}
-
-TEST_F(VlpDispersion, WritesPlotAsSvgFile) {
-  const auto result =
-      dispersion(turn(12, 6.28), "--reference-point 0.1 -0.05 --plot " + path("picture.svg"));
-  ASSERT_EQ(result.exit_code, 0) << result.errors;
-  const std::string svg = TemporaryFolder::read_content(folder / "picture.svg");
-  for (const char* part : {"<svg", "before", "after", "reference point", "</svg>"}) {
-    EXPECT_THAT(svg, HasSubstr(part));
-  }
-}
-
-TEST_F(VlpDispersion, KeepsCameraAndWarnsToRunVlpRotationWithoutRotationCenter) {
-  rig.calibration.rotation_center.reset();
-  believed.rotation_center.reset();
-  believed.dispersion.reset();
-  write_calibration(folder / "rotated.yaml", believed);
-  const auto result = dispersion(turn(6, 6.28), "--reference-point 0.1 -0.05");
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.errors, HasSubstr("run vlp-rotation first"));
-  EXPECT_THAT(result.output, Not(HasSubstr("nan")));
-  const Calibration written = read_calibration(folder / "calibration.yaml");
-  EXPECT_EQ(written.camera.intrinsics, believed.camera.intrinsics);
-  EXPECT_EQ(written.camera.imager_px, believed.camera.imager_px);
-  EXPECT_FALSE(written.rotation_center);
-  EXPECT_TRUE(written.dispersion);
+  EXPECT_EQ(dispersion(turn(6, 6.28), paper).exit_code, 3);
+  const auto of_paper = dispersion(turn(6, 0), paper + " --circle enclosing");
+  EXPECT_EQ(of_paper.exit_code, 0) << of_paper.errors;
+  EXPECT_THAT(of_paper.output, HasSubstr("assumed correct"));
 }
 
 /// From images at the reference point of a scene: a camera whose rotation center has an error of

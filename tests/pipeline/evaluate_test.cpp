@@ -71,6 +71,9 @@ TEST_F(VlpEvaluate, PrintsHandComputedMetrics) {
                     HasSubstr("too few reference points for an interval"),
                     HasSubstr("ref. points 2 with 5 fixes"), HasSubstr("height      rms 0.894 mm"),
                     HasSubstr("yaw         rms 0.2562 deg")));
+  EXPECT_THAT(result.errors, testing::Not(HasSubstr("missing_fraction")));
+  EXPECT_THAT(with_truth("--gate mean_mm=2.5").errors,
+              HasSubstr("1 of 6 captures has no fix, and there is no gate 'missing_fraction'"));
 }
 
 TEST_F(VlpEvaluate, ReturnsOneAndWritesJsonAndJUnitWhenGateFails) {
@@ -90,28 +93,21 @@ TEST_F(VlpEvaluate, ReturnsOneAndWritesJsonAndJUnitWhenGateFails) {
 }
 
 TEST_F(VlpEvaluate, WritesErrorToJUnitWhenNoGateIsChecked) {
-  const auto unknown = with_truth("--gate mean_mm=1,worse_mm=1 --junit junit.xml");
-  EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(content("junit.xml"), AllOf(HasSubstr("errors=\"1\""),
-                                          HasSubstr("<error type=\"bad_input\" message=\"gate "
-                                                    "'worse_mm': the metric has no value here")));
-  folder.file("fixes.csv", kFixes + "a.png,too_few_lamps,,,,,,,,,1,\n");
-  const auto none = with_truth("--gate mean_mm=1 --junit junit.xml");
-  EXPECT_EQ(none.exit_code, 3);
-  EXPECT_THAT(content("junit.xml"), HasSubstr("<error type=\"undetermined\" message=\""));
-}
-
-TEST_F(VlpEvaluate, WritesErrorToJUnitForBadArguments) {
-  const auto expect_error = [&](const std::string& options, const std::string& words) {
-    ASSERT_EQ(with_truth("--gate mean_mm=3 --junit junit.xml").exit_code, 0);
-    EXPECT_THAT(content("junit.xml"), HasSubstr("errors=\"0\""));
-    EXPECT_EQ(with_truth(options).exit_code, 2);
+  const auto expect_error = [&](const std::string& options, int exit_code,
+                                const std::string& words) {
+    SCOPED_TRACE(options);
+    folder.file("junit.xml", "<testsuites errors=\"0\"/>\n");
+    EXPECT_EQ(with_truth(options).exit_code, exit_code);
     EXPECT_THAT(content("junit.xml"), AllOf(HasSubstr("errors=\"1\""), HasSubstr(words)));
   };
-  expect_error("--gate mean_mm=1 --junit junit.xml --odd", "unknown: --odd");
-  expect_error("--junit=junit.xml --gate", "--gate: 1 required");
-  expect_error("--gate mean_mm=1 --junit junit.xml --json truth.csv", "is also an input");
-  expect_error("--gates none.yaml --junit junit.xml", "none.yaml");
+  expect_error("--gate mean_mm=1,worse_mm=1 --junit junit.xml", 2,
+               "<error type=\"bad_input\" message=\"gate 'worse_mm': the metric has no value here");
+  expect_error("--gate mean_mm=1 --junit junit.xml --odd", 2, "unknown: --odd");
+  expect_error("--junit=junit.xml --gate", 2, "--gate: 1 required");
+  expect_error("--gate mean_mm=1 --junit junit.xml --json truth.csv", 2, "is also an input");
+  expect_error("--gates none.yaml --junit junit.xml", 2, "none.yaml");
+  folder.file("fixes.csv", kFixes + "a.png,too_few_lamps,,,,,,,,,1,\n");
+  expect_error("--gate mean_mm=1 --junit junit.xml", 3, "<error type=\"undetermined\" message=\"");
   const std::string truth = content("truth.csv");
   EXPECT_EQ(with_truth("--junit truth.csv --odd").exit_code, 2);
   EXPECT_EQ(content("truth.csv"), truth) << "not a JUnit file";
@@ -129,31 +125,6 @@ TEST_F(VlpEvaluate, ProposedGatesPassForSameFixes) {
                     HasSubstr("  height_rms_mm: "), HasSubstr("  missing_fraction: 0 ")));
   const auto passed = evaluate_example("--noise-px 0.05 --gates '" + path("gates.yaml") + "'");
   EXPECT_EQ(passed.exit_code, 0) << passed.errors;
-}
-
-TEST_F(VlpEvaluate, WarnsOfMissingFixesWithoutGate) {
-  const std::string words = "1 of 6 captures has no fix, and there is no gate 'missing_fraction'";
-  const auto result = with_truth("--gate mean_mm=2.5 --report r.html");
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.errors, HasSubstr(words));
-  const std::string html = content("r.html");
-  EXPECT_LT(html.find("<strong>PASS</strong>"), html.find("<p>1 of 6 captures has no fix"));
-  EXPECT_THAT(with_truth("--gate missing_fraction=1").errors, testing::Not(HasSubstr(words)));
-}
-
-TEST_F(VlpEvaluate, CommandLineGatesOverrideGatesOfFile) {
-  folder.file("gates.yaml", "format: vlp-gates/1\ngates: {mean_mm: 1, max_mm: 5}\n");
-  EXPECT_EQ(with_truth("--gates gates.yaml").exit_code, 1);
-  EXPECT_EQ(with_truth("--gates gates.yaml --gate mean_mm=3").exit_code, 0);
-  EXPECT_EQ(with_truth("--gates gates.yaml --gate mean_mm=3,rms_mm=1").exit_code, 1);
-  folder.file("gates.yaml", "format: vlp-gates/1\ngates:\n  mean_mm: 1\n  mean: 1\n");
-  const auto unknown = with_truth("--gates gates.yaml");
-  EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(unknown.errors, HasSubstr("gates.yaml:4: gates: key 'mean' is unknown"));
-  folder.file("gates.yaml", "format: vlp-gates/1\ngates:\n  missing_fraction: 50\n");
-  EXPECT_THAT(
-      with_truth("--gates gates.yaml").errors,
-      HasSubstr("gates.yaml:3: gates.missing_fraction: should be a fraction from 0 to 1, not 50"));
 }
 
 TEST_F(VlpEvaluate, PrintsErrorsForPathOptionAndWithLineFitForLineOption) {
@@ -258,101 +229,15 @@ TEST_F(VlpEvaluate, CompareOptionFailsForWorseHeightYawOrSdAndForLostRows) {
   expect_refused(make_fixes(0, 0.001, 0, 0.001), "baseline.csv: was changed after it was accepted");
 }
 
-TEST_F(VlpEvaluate, SchemaRejectsChangedEvaluationJson) {
-  with_truth("--json evaluation.json");
-  const std::string whole = content("evaluation.json");
-  const auto problems_with = [&](const std::string& what, const std::string& other) {
-    std::string text = whole;
-    EXPECT_NE(text.find(what), std::string::npos) << what;
-    text.replace(text.find(what), what.size(), other);
-    return problems_by_schema("evaluation", {folder.file("other.json", text)});
-  };
-  EXPECT_EQ(problems_with("\"captures\": 6", "\"captures\": 6"), "");
-  EXPECT_THAT(problems_with("\"captures\": 6", "\"captures\": 6.5"), HasSubstr("$.captures: 6.5"));
-  EXPECT_THAT(problems_with("\"captures\": 6,", ""), HasSubstr("'captures' is a required"));
-  EXPECT_THAT(problems_with("\"captures\"", "\"caught\": 0, \"captures\""), HasSubstr("'caught'"));
-  EXPECT_THAT(problems_with("vlp-evaluation/4", "vlp-evaluation/3"), HasSubstr("$.format"));
-}
-
-TEST_F(VlpEvaluate, ErrorsOfExampleAreWithinThirtyPercentOfCrlb) {
+TEST_F(VlpEvaluate, ErrorsOfExampleAreWithinThirtyPercentOfCrlbForTrueNoise) {
   // Errors of 36 fixes are within 30 % of the limit of their noise: three standard errors.
   const auto result =
       evaluate_example("--noise-px 0.05 --gate crlb_ratio=1.3,normalized_error_rms=1.3");
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output,
               AllOf(HasSubstr("limit       0.1"), HasSubstr("error / sd  horizontal")));
-}
-
-TEST_F(VlpEvaluate, WarnsOfErrorsBelowCrlb) {
-  const auto result =
-      evaluate_example("--noise-px 0.1 --json '" + path("e.json") + "'");  // 0.05 in truth
-  EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, HasSubstr("(below the limit: see the warning)"));
-  EXPECT_THAT(result.errors, HasSubstr("or the fixes use more information than one"));
-  EXPECT_THAT(content("e.json"), HasSubstr("\"errors_below_crlb\": true"));
-  EXPECT_EQ(problems_by_schema("evaluation", {folder / "e.json"}), "");
-}
-
-TEST_F(VlpEvaluate, ReturnsThreeWhenNoCaptureHasFix) {
-  folder.file("fixes.csv", kFixes + "a.png,degenerate,,,,,,,,,1,\n");
-  const auto result = with_truth("--json none.json");
-  EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.errors, HasSubstr("none of 6 captures has a fix"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "none.json"));
-}
-
-TEST_F(VlpEvaluate, NamesFileAndLineOfBadInput) {
-  const auto refused = [&](const std::string& rows) {
-    folder.file("fixes.csv", rows);
-    const auto result = with_truth();
-    EXPECT_EQ(result.exit_code, 2) << rows;
-    return result.errors;
-  };
-  const std::string good = "a.png,ok,0,0,0,0,,,,,3,0\n";
-  EXPECT_THAT(refused(kFixes + good + "z.png,ok,0,0,0,0,,,,,3,0\n"),
-              HasSubstr("fixes.csv:3: image: 'z.png' is not in truth.csv"));
-  EXPECT_THAT(refused(kFixes + good + good), HasSubstr("fixes.csv:3: image: 'a.png' occurs twice"));
-  EXPECT_THAT(refused(kFixes + "a.png,ok,nan,0,0,0,,,,,3,0\n"),
-              HasSubstr("fixes.csv:2: x_m: should be a finite number, not 'nan'"));
-  EXPECT_THAT(refused(kFixes + "a.png,ok,,0,0,0,,,,,3,0\n"), HasSubstr("fixes.csv:2: x_m"));
-  EXPECT_THAT(refused(kFixes + "a.png,ok,1e308,0,0,0,,,,,3,0\n"),
-              HasSubstr("fixes.csv:2: x_m: should be within 1,000 km"));
-  EXPECT_THAT(refused(kFixes + "a.png,ok,0,0,0,0,-1,1,1,1,3,0\n"),
-              HasSubstr("fixes.csv:2: x_sd_m: should not be negative"));
-  EXPECT_THAT(refused(kFixes), HasSubstr("fixes.csv: contains no fix"));
-  EXPECT_THAT(refused(""), HasSubstr("fixes.csv: is empty"));
-  folder.file("truth.csv", "image,x_m,y_m\na.png,0,0\na.png,0,0\n");
-  EXPECT_THAT(refused(kFixes + good), HasSubstr("truth.csv:3: image: 'a.png' occurs twice"));
-}
-
-TEST_F(VlpEvaluate, NamesUnitOfTruthInMillimeters) {
-  folder.file("truth.csv",
-              "image,x_m,y_m\n"
-              "a.png,0,0\nb.png,0,0\nc.png,1000,0\nd.png,1000,0\ne.png,1000,0\nf.png,1000,0\n");
-  const auto result = with_truth("--gate missing_fraction=1 --junit junit.xml");
-  EXPECT_EQ(result.exit_code, 2);
-  const std::string problem = "truth.csv:2: x_m: the values agree with the fixes if they are in mm";
-  EXPECT_THAT(result.errors, HasSubstr(problem));
-  EXPECT_THAT(content("junit.xml"), HasSubstr(problem));
-}
-
-TEST_F(VlpEvaluate, ReturnsTwoForBadUsage) {
-  for (const char* options :
-       {"", "--truth truth.csv --line 0 0 1 0", "--line 0 0 0 0", "--line 0 0 1",
-        "--truth truth.csv --gate mean=1", "--truth truth.csv --gate mean_mm=x",
-        "--truth truth.csv --gate missing_fraction=50", "--truth truth.csv --gate mean_mm=-1",
-        "--truth truth.csv --gate mean_mm=1,mean_mm=2", "--truth truth.csv --gate fitted_mean_mm=1",
-        "--truth truth.csv --junit a.xml", "--truth truth.csv --json truth.csv",
-        "--truth truth.csv --noise-px 1", "--truth truth.csv --same-point-mm 0", "--line 0 0 1e7 0",
-        "--truth truth.csv --json a --report ./a",
-        "--truth truth.csv --json a --junit a --gate mean_mm=1"}) {
-    EXPECT_EQ(evaluate(options).exit_code, 2) << options;
-  }
-  EXPECT_THAT(with_truth("--gate mean=1").errors, HasSubstr("the gates are: mean_mm, median_mm"));
-  const auto without_fixes = run_program("cd '" + path("") + "' && vlp-evaluate --truth truth.csv");
-  EXPECT_EQ(without_fixes.exit_code, 2);
-  EXPECT_EQ(without_fixes.errors,
-            "vlp-evaluate: error: fixes is required; see vlp-evaluate --help\n");
+  EXPECT_THAT(evaluate_example("--noise-px 0.1").output,
+              HasSubstr("(below the limit: see the warning)"));
 }
 
 TEST_F(VlpEvaluate, WritesIdenticalJsonForOneAndFourThreads) {

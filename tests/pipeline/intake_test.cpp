@@ -98,6 +98,21 @@ class Intake : public SmallStation {
     }
     return reasons;
   }
+  /// The row time is measured from the rotation in a session, from all steps at the station.
+  void expect_same_metrics() const {
+    const json runs = json::parse(TemporaryFolder::read_content(folder / "runs.json"));
+    const json session =
+        json::parse(TemporaryFolder::read_content(folder / "results/session.json"));
+    int same = 0;
+    for (const json& metric : session.at("metrics")) {
+      const auto name = metric.at("name").get<std::string>();
+      const json& of_station = runs.at(0).at("metrics");
+      if (!of_station.contains(name) || name.starts_with("row_time")) continue;
+      EXPECT_EQ(of_station.at(name).at("value"), metric.at("value")) << name;
+      ++same;
+    }
+    EXPECT_EQ(same, 20) << "of lens, sharpness, rotation and dispersion";
+  }
 };
 
 /// Returns a calibration without what differs by definition: the history, and the keys of the
@@ -157,6 +172,7 @@ TEST_F(Intake, RejectionsAndCalibrationAreEqualAtStationAndInSession) {
   EXPECT_THAT(reasons.at("boards/0003j-near.png"), HasSubstr("the same view as 0003.png"));
   EXPECT_THAT(reasons.at("rotation/0003i-near.png"), HasSubstr("the same view as 0003.png"));
 
+  expect_same_metrics();
   const std::string by_station = without_origin(result("0001", "calibration.yaml"));
   EXPECT_THAT(by_station, HasSubstr("dispersion:"));
   EXPECT_EQ(by_station,

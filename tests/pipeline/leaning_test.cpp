@@ -11,7 +11,6 @@
 
 #include "captures/fixes_table.h"
 #include "captures/truth_table.h"
-#include "rig/lamp_map.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
 
@@ -156,48 +155,6 @@ TEST_F(TiltedCamera, FixesAreWithinOneMillimeterWithInclinationSensor) {
   }
 }
 
-/// The images of a camera that looks up, with a map rotated by 180 degrees about x: lamps below it.
-TEST_F(TiltedCamera, FixesOfLampsBelowCameraAreThoseOfLampsAboveRotated) {
-  add_set(30);
-  render();
-  const auto expect_rotated = [&](const std::string& set, const std::string& options,
-                                  const std::string& options_below) {
-    ASSERT_EQ(locate(set, options).exit_code, 0);
-    const auto above = read_fixes(fixes_file(set));
-    const std::string lamps = TemporaryFolder::read_content(folder / "out/lamps.yaml");
-    LampMap map = read_lamp_map(folder / "out/lamps.yaml");
-    map.lamps_below_camera = true;
-    for (Lamp& lamp : map.lamps) lamp.position_m.tail<2>() *= -1;
-    write_lamp_map(folder / "out/lamps.yaml", map);
-    ASSERT_EQ(locate(set, options_below).exit_code, 0);
-    folder.file("out/lamps.yaml", lamps);
-    const auto below = read_fixes(fixes_file(set));
-    ASSERT_EQ(below.size(), above.size());
-    for (std::size_t i = 0; i < above.size(); ++i) {
-      ASSERT_TRUE(above[i].fix && below[i].fix);
-      Eigen::Vector3d expected_m = above[i].fix->pose.position_m;
-      expected_m.tail<2>() *= -1;
-      EXPECT_LT((below[i].fix->pose.position_m - expected_m).norm(), 1e-8);
-      EXPECT_NEAR(below[i].fix->pose.yaw_rad, -above[i].fix->pose.yaw_rad, 1e-8);
-      EXPECT_NEAR(below[i].fix->sd.value()[0], above[i].fix->sd.value()[0], 1e-8);
-    }
-  };
-  for (const std::string set : {"roll30", "pitch30"}) {
-    SCOPED_TRACE(set);
-    const std::string free = "--roll-pitch-sd-deg 90";
-    expect_rotated(set, free, free);
-    // With an inclination sensor, whose pitch has the other sign.
-    std::array<std::string, 2> tables{"image,roll_rad,pitch_rad\n", "image,roll_rad,pitch_rad\n"};
-    const double tilt_rad = std::numbers::pi / 6, roll_rad = set == "roll30" ? tilt_rad : 0;
-    for (const TruthRow& row : read_truth_table(folder / "out" / set / "truth.csv")) {
-      tables[0] += fmt::format("{},{},{}\n", row.image, roll_rad, tilt_rad - roll_rad);
-      tables[1] += fmt::format("{},{},{}\n", row.image, roll_rad, roll_rad - tilt_rad);
-    }
-    expect_rotated(set, "--captures " + folder.file("above.csv", tables[0]).string(),
-                   "--captures " + folder.file("below.csv", tables[1]).string());
-  }
-}
-
 /// A camera of 3 Mpx close to large lamps, which show enough stripes from aside.
 TEST_F(TiltedCamera, FixesAreWithinThreeMillimetersForUnknownTiltUpTo80Degrees) {
   std::string scene = kScene;
@@ -239,20 +196,6 @@ TEST_F(TiltedCamera, FixesAreWithinThreeMillimetersForUnknownTiltUpTo80Degrees) 
     errors.check(2, degrees == 80 ? 3e-3 : 1e-3);
     RecordProperty("steep_" + set, errors.words());
   }
-}
-
-TEST_F(TiltedCamera, AnnotatedImageDiffersWhenRollAndPitchAreEstimated) {
-  add_set(15);
-  render();
-  const std::string level = (folder / "level").string(), leaning = (folder / "leaning").string();
-  ASSERT_EQ(locate("roll15", "--annotate " + level).exit_code, 0);
-  ASSERT_EQ(locate("roll15", "--roll-pitch-sd-deg 90 --threads 1 --annotate " + leaning).exit_code,
-            0);
-  const std::string fixes = TemporaryFolder::read_content(fixes_file("roll15"));
-  EXPECT_NE(TemporaryFolder::read_content(folder / "level/0000.png.png"),
-            TemporaryFolder::read_content(folder / "leaning/0000.png.png"));
-  ASSERT_EQ(locate("roll15", "--roll-pitch-sd-deg 90 --threads 3").exit_code, 0);
-  EXPECT_EQ(TemporaryFolder::read_content(fixes_file("roll15")), fixes);
 }
 
 /// Neither lean nor motion is known.

@@ -3,8 +3,8 @@
 /// vlp-locate as its users call it.
 #include <gmock/gmock.h>
 
-#include "captures/csv_reader.h"
 #include "captures/detections_table.h"
+#include "support/csv_cells.h"
 #include "support/program.h"
 #include "support/synthetic_rig.h"
 #include "support/temporary_folder.h"
@@ -31,11 +31,11 @@ class VlpLocate : public testing::Test {
   }
   double figure(std::size_t row, const char* column) {
     const CsvTable fixes(folder / "fixes.csv");
-    return fixes.get_cell_number(row, fixes.get_required_column(column));
+    return read_number(fixes, row, column);
   }
   std::string word(std::size_t row, const char* column) {
     const CsvTable fixes(folder / "fixes.csv");
-    return std::string(fixes.get_cell_text(row, fixes.get_required_column(column)));
+    return read_text(fixes, row, column);
   }
   std::vector<Detection> seen(std::size_t lamps, std::optional<double> sigma_px = 0.1) {
     auto detections = seen_from(rig);
@@ -87,76 +87,41 @@ TEST_F(VlpLocate, PositionSdScalesWithSigmaPxOptionAndMatchesScatterOfFixesWitho
   EXPECT_NEAR(figure(0, "x_sd_m"), std::sqrt(scatter), 0.1 * std::sqrt(scatter));
 }
 
-TEST_F(VlpLocate, LeavesSdEmptyAndWarnsWhenNoiseIsUnknown) {
-  const auto result = locate({{"a", seen(2, std::nullopt)}});
-  ASSERT_EQ(result.exit_code, 0);
-  EXPECT_EQ(word(0, "x_sd_m"), "");
-  EXPECT_THAT(result.errors, HasSubstr("sd columns are empty"));
-}
-
-TEST_F(VlpLocate, CorrectsTiltWithInclinationsOfCapturesTable) {
+TEST_F(VlpLocate, UsesInclinationHeightAndYawOfCapturesTable) {
   rig.inclination = {0.05, -0.03};
-  const auto captures = folder.file("captures.csv", "image,roll_rad,pitch_rad\na,0.05,-0.03\n");
-  const auto seen_leaning = seen(4);
-  ASSERT_EQ(locate({{"a", seen_leaning}}, "--captures " + captures.string()).exit_code, 0);
+  const auto captures =
+      folder.file("captures.csv", "image,roll_rad,pitch_rad,z_m,yaw_rad\na,0.05,-0.03,0.05,0.5\n");
+  const std::string with_captures = "--captures " + captures.string();
+  ASSERT_EQ(locate({{"a", seen(4)}}, with_captures).exit_code, 0);
   EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
   const double sd_m = figure(0, "x_sd_m");
-  locate({{"a", seen_leaning}}, "--captures " + captures.string() + " --inclination-sigma-deg 0.1");
+  locate({{"a", seen(4)}}, with_captures + " --inclination-sigma-deg 0.1");
   EXPECT_GT(figure(0, "x_sd_m"), 2 * sd_m);
-  locate({{"a", seen_leaning}});
-  EXPECT_GT(std::hypot(figure(0, "x_m") - 0.1, figure(0, "y_m") + 0.2), 0.02);
-}
-
-TEST_F(VlpLocate, WarnsWhenCapturesTableOmitsImages) {
-  const auto captures = folder.file("captures.csv", "image,roll_rad,pitch_rad\nz.png,0,0\n");
-  const auto result = locate({{"a", seen(4)}}, "--captures " + captures.string());
-  EXPECT_THAT(result.errors, HasSubstr("1 of 1 images are not in captures.csv"));
-  EXPECT_EQ(locate({{"a", seen(4)}}, "--one-lamp").exit_code, 2) << "it needs captures.csv";
-}
-
-TEST_F(VlpLocate, OneLampOptionIsRequiredToLocateFromOneLamp) {
-  const auto captures = folder.file("captures.csv", "image,z_m,yaw_rad\na,0.05,0.5\n");
-  EXPECT_EQ(locate({{"a", seen(1)}}, "--captures " + captures.string()).exit_code, 3);
-  const auto result = locate({{"a", seen(1)}}, "--one-lamp --captures " + captures.string());
-  ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
-}
-
-TEST_F(VlpLocate, WritesRobotPoseWithCameraOnRobotOption) {
-  ASSERT_EQ(locate({{"a", seen(4)}}, "--camera-on-robot 0.3 0 0.2 90").exit_code, 0);
-  const double robot_yaw_rad = 0.5 - M_PI / 2;
-  EXPECT_NEAR(figure(0, "yaw_rad"), robot_yaw_rad, 1e-5);
-  EXPECT_NEAR(figure(0, "x_m"), 0.1 - 0.3 * std::cos(robot_yaw_rad), 1e-5);
-  EXPECT_NEAR(figure(0, "y_m"), -0.2 - 0.3 * std::sin(robot_yaw_rad), 1e-5);
-  EXPECT_NEAR(figure(0, "z_m"), 0.05 - 0.2, 1e-5);
-}
-
-TEST_F(VlpLocate, AppliesTiltCorrectionUnlessCorrectionOptionIsNone) {
-  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
-  const auto seen_tilted = seen(4);
-  locate({{"a", seen_tilted}});
-  EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
-  locate({{"a", seen_tilted}}, "--correction rotation");
-  EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
-  locate({{"a", seen_tilted}}, "--correction none");
-  EXPECT_GT(std::hypot(figure(0, "x_m") - 0.1, figure(0, "y_m") + 0.2), 0.02);
-  const auto result = locate({{"a", seen_tilted}}, "--correction dispersion");
-  EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, HasSubstr("the calibration has no dispersion"));
-}
-
-TEST_F(VlpLocate, ExitsWith3WhenNoFrameHasFix) {
-  const auto result = locate({{"a", seen(1)}});
-  EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.errors, HasSubstr("no frame has a fix; the first: fewer than two lamps"));
+  const auto refused = locate({{"a", seen(1)}}, with_captures);
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_THAT(refused.errors, HasSubstr("no frame has a fix; the first: fewer than two lamps"));
   EXPECT_EQ(word(0, "status"), "too_few_lamps") << "the rows are written all the same";
+  ASSERT_EQ(locate({{"a", seen(1)}}, with_captures + " --one-lamp").exit_code, 0);
+  EXPECT_NEAR(figure(0, "x_m"), 0.1, 1e-5);
 }
 
-TEST_F(VlpLocate, QuietPrintsNothingAndVerboseNamesContradictingLamp) {
-  EXPECT_EQ(locate({{"a", seen(4)}}, "--quiet").output, "");
-  auto wrong = seen(4);
-  wrong[0].lamp = 8;
-  EXPECT_THAT(locate({{"a", wrong}}, "--verbose").errors, HasSubstr("a: lamp 8 contradicts"));
+TEST_F(VlpLocate, WritesRobotPoseWithTiltCorrectionUnlessOptionIsNone) {
+  rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.03, 1);
+  const std::string on_robot = "--camera-on-robot 0.3 0 0.2 90 ";
+  const double robot_yaw_rad = 0.5 - M_PI / 2;
+  const auto error_m = [&] {
+    return std::hypot(figure(0, "x_m") - 0.1 + 0.3 * std::cos(robot_yaw_rad),
+                      figure(0, "y_m") + 0.2 + 0.3 * std::sin(robot_yaw_rad));
+  };
+  for (const std::string options : {"", "--quiet --correction rotation"}) {
+    const auto result = locate({{"a", seen(4)}}, on_robot + options);
+    EXPECT_EQ(result.output.empty(), !options.empty());
+    EXPECT_LT(error_m(), 1e-5) << options;
+    EXPECT_NEAR(figure(0, "yaw_rad"), robot_yaw_rad, 1e-5);
+    EXPECT_NEAR(figure(0, "z_m"), 0.05 - 0.2, 1e-5);
+  }
+  locate({{"a", seen(4)}}, on_robot + "--correction none");
+  EXPECT_GT(error_m(), 0.02);
 }
 
 }  // namespace

@@ -318,15 +318,6 @@ TEST(DocumentationPages, NamedOptionsExistInHelpOfTheirPrograms) {
   EXPECT_GT(checked, 60U);
 }
 
-TEST(NamedOptions, ReturnsOptionNamesOfCommandTextWithoutValues) {
-  EXPECT_THAT(named_options("vlp-locate FOLDER --camera-on-robot"),
-              testing::ElementsAre("--camera-on-robot"));
-  EXPECT_THAT(named_options("--gate missing_fraction=0 --json=out/no--option.json"),
-              testing::ElementsAre("--gate", "--json"));
-  EXPECT_THAT(listed_options("\n  -o,--output TEXT\n  --row-time-s FLOAT\n      as --other\n"),
-              testing::ElementsAre("--output", "--row-time-s"));
-}
-
 /// Each metric has one row in "Choosing gates", marked if its gate is a minimum or not of the
 /// camera.
 TEST(DocumentationPages, ChoosingGatesPageHasOneRowForEachMetric) {

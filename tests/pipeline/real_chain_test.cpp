@@ -8,12 +8,12 @@
 #include <cmath>
 
 #include "camera/lens.h"
-#include "captures/csv_reader.h"
 #include "captures/fixes_table.h"
 #include "geometry/frames.h"
 #include "pipeline/intrinsics_program.h"
 #include "rig/calibration.h"
 #include "rig/lamp_map.h"
+#include "support/csv_cells.h"
 #include "support/real_data.h"
 
 namespace vlp {
@@ -127,9 +127,7 @@ TEST_F(VlpIntrinsics, PhoneCalibrationGivesVlpLimitsSdsOfPinholeFormula) {
   ASSERT_EQ(limits.exit_code, 0) << limits.errors;
   const CsvTable map(folder / "map.csv");
   ASSERT_EQ(map.num_rows(), 1);
-  const auto figure = [&](const char* column) {
-    return map.get_cell_number(0, map.get_required_column(column));
-  };
+  const auto figure = [&](const char* column) { return read_number(map, 0, column); };
   // n lamps about the camera, S the sum of their squared distances from its axis:
   // sd_x = sigma h / (f sqrt(n)), sd_z = sigma h^2 / (f sqrt(S)); the lens stretches the image by
   // up to 3 k1 r^2 = 2 % there, which makes them smaller.

@@ -11,9 +11,9 @@
 #include <sstream>
 #include <utility>
 
-#include "captures/csv_reader.h"
 #include "captures/csv_writer.h"
 #include "rig/calibration.h"
+#include "support/csv_cells.h"
 #include "support/polyline.h"
 #include "support/program.h"
 #include "support/real_data.h"
@@ -61,9 +61,7 @@ class RealLog : public testing::Test {
   /// In third.csv, to adjust by them in a third of the time.
   void keep_every_third_frame() const {
     const CsvTable all(log / "detections.csv");
-    const auto text = [&](std::size_t row, const char* name) {
-      return all.get_cell_text(row, all.get_required_column(name));
-    };
+    const auto text = [&](std::size_t row, const char* name) { return read_text(all, row, name); };
     CsvWriter some(folder / "third.csv", {"image", "lamp", "u_px", "v_px"});
     std::string_view image;
     int images = 0;
@@ -89,19 +87,17 @@ class RealLog : public testing::Test {
     std::vector<Eigen::Vector2d> driven;
     const CsvTable waypoints(log / "path.csv");
     for (std::size_t row = 0; row < waypoints.num_rows(); ++row) {
-      driven.emplace_back(waypoints.get_cell_number(row, waypoints.get_required_column("x_m")),
-                          waypoints.get_cell_number(row, waypoints.get_required_column("y_m")));
+      driven.emplace_back(read_number(waypoints, row, "x_m"), read_number(waypoints, row, "y_m"));
     }
     const CsvTable fixes(folder / "fixes.csv");
     EXPECT_EQ(fixes.num_rows(), 5057);
     double sum_m = 0;
     std::vector<double> residuals_px;
     for (std::size_t row = 0; row < fixes.num_rows(); ++row) {
-      EXPECT_EQ(fixes.get_cell_text(row, fixes.get_required_column("status")), "ok");
+      EXPECT_EQ(read_text(fixes, row, "status"), "ok");
       sum_m +=
-          distance_from(driven, {fixes.get_cell_number(row, fixes.get_required_column("x_m")),
-                                 fixes.get_cell_number(row, fixes.get_required_column("y_m"))});
-      residuals_px.push_back(fixes.get_cell_number(row, fixes.get_required_column("residual_px")));
+          distance_from(driven, {read_number(fixes, row, "x_m"), read_number(fixes, row, "y_m")});
+      residuals_px.push_back(read_number(fixes, row, "residual_px"));
     }
     std::nth_element(residuals_px.begin(), residuals_px.begin() + 2528, residuals_px.end());
     return {sum_m / 5057, residuals_px[2528]};
@@ -212,8 +208,7 @@ TEST_F(RealLog, FixesMatchPathLengthOnlyWithLensAdjustedToLog) {
          {std::pair(log / "path.csv", &driven), std::pair(folder / "fixes.csv", &fixes)}) {
       const CsvTable table(file);
       for (std::size_t row = 0; row < table.num_rows(); ++row) {
-        points->emplace_back(table.get_cell_number(row, table.get_required_column("x_m")),
-                             table.get_cell_number(row, table.get_required_column("y_m")));
+        points->emplace_back(read_number(table, row, "x_m"), read_number(table, row, "y_m"));
       }
     }
     return path_over_fixes(driven, fixes);
@@ -234,8 +229,8 @@ TEST_F(RealLog, FixesMatchPathLengthOnlyWithLensAdjustedToLog) {
   const CsvTable fixes(folder / "fixes.csv");
   double variance_m2 = 0;
   for (std::size_t row = 0; row < fixes.num_rows(); ++row) {
-    const double x_m = fixes.get_cell_number(row, fixes.get_required_column("x_sd_m"));
-    const double y_m = fixes.get_cell_number(row, fixes.get_required_column("y_sd_m"));
+    const double x_m = read_number(fixes, row, "x_sd_m");
+    const double y_m = read_number(fixes, row, "y_sd_m");
     variance_m2 += (x_m * x_m + y_m * y_m) / 2 / static_cast<double>(fixes.num_rows());
   }
   const double ratio = after.mean_distance_m / (0.798 * std::sqrt(variance_m2));

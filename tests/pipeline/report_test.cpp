@@ -90,21 +90,6 @@ TEST_F(VlpEvaluateReport, IsByteIdenticalOnRepeatAndWrittenWhenGateFails) {
               HasSubstr("FAIL</strong>1 of 2"));
 }
 
-TEST_F(VlpEvaluateReport, RejectsInvalidInputsWithoutWritingReport) {
-  const auto refusal = [&](const std::string& more) {
-    const auto [code, output, errors] = evaluate(more);
-    EXPECT_EQ(code, 2) << more;
-    EXPECT_FALSE(std::filesystem::exists(folder / "report.html")) << "nothing half-written";
-    return errors;
-  };
-  EXPECT_THAT(refusal(" --picture" + in("fixes.csv")), HasSubstr("is neither an SVG nor a PNG"));
-  EXPECT_THAT(refusal(" --picture" + in("none.svg")), HasSubstr("none.svg: cannot be opened"));
-  EXPECT_THAT(refusal(" --track" + in("track.csv") + " 1 0 1 0"),
-              HasSubstr("start and end of the line are equal"));
-  EXPECT_THAT(refusal(" --json" + in("report.html")),
-              HasSubstr("--json and --report are the same file"));
-}
-
 /// A page that passes, small enough to be broken in many ways.
 std::string good_page() {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};

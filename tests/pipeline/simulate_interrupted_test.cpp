@@ -41,26 +41,6 @@ TEST_F(VlpSimulateInterrupted, RendersOnlyMissingImagesWhenRepeated) {
   }
 }
 
-TEST_F(VlpSimulateInterrupted, RendersNothingWhenComplete) {
-  ASSERT_EQ(simulate().exit_code, 0);
-  const Files before = files_below(output);
-  EXPECT_EQ(simulate().output, "rendered 0 captures, 24 existed; in " + output.string() + "\n");
-  EXPECT_TRUE(files_below(output) == before);
-}
-
-TEST_F(VlpSimulateInterrupted, RendersIntoExistingEmptyFolder) {
-  ASSERT_TRUE(std::filesystem::create_directory(output));
-  EXPECT_EQ(simulate("--only boards").exit_code, 0);
-}
-
-// That is how it is left when the program is killed as it writes there first; see AtomicFileWriter.
-TEST_F(VlpSimulateInterrupted, RendersIntoFolderWithLeftTemporarySceneFile) {
-  ASSERT_TRUE(std::filesystem::create_directory(output));
-  folder.file("output/.scene.yaml.tmp-123-0", "# vlp-sim");
-  const auto result = simulate("--only boards");
-  EXPECT_EQ(result.exit_code, 0) << result.errors;
-}
-
 TEST_F(VlpSimulateInterrupted, LeavesOnlyCompleteFilesWhenKilledAndResumes) {
   const Files expected = undisturbed();
   const auto begin = std::chrono::steady_clock::now();

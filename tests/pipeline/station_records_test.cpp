@@ -53,25 +53,6 @@ TEST_F(VlpStationRecords, CleanDeletesExpiredImagesAndKeepsRecord) {
   EXPECT_THAT(records("list").output, HasSubstr("1 runs"));
 }
 
-/// Stations that share their records.
-TEST_F(VlpStationRecords, ListsOnlyRunsOfOwnStationInSharedRecords) {
-  ASSERT_EQ(run_program(run("0001", "--idle-s 0.1")).exit_code, 3);
-  change("station.yaml", "station: station-1", "station: station-2");
-  ASSERT_EQ(run_program(run("0002", "--idle-s 0.1")).exit_code, 3);
-  const auto own = records("list");
-  EXPECT_EQ(own.exit_code, 0) << own.errors;
-  EXPECT_THAT(own.output, AllOf(HasSubstr("station-2"), Not(HasSubstr("station-1")),
-                                HasSubstr("1 runs, 0 passed, 0 failed, 1 invalid\n")));
-  EXPECT_THAT(records("list --of-station station-1").output,
-              AllOf(HasSubstr("station-1"), Not(HasSubstr("station-2"))));
-  EXPECT_THAT(records("list --of-station any").output, HasSubstr("2 runs"));
-  EXPECT_EQ(records("export -o " + (folder / "runs.csv").string()).output, "1 runs\n");
-  EXPECT_THAT(records("show --camera-id 0001").errors, HasSubstr("there is no such run"));
-  // Records alone are of no station.
-  const std::string database = (folder / "station/records.db").string();
-  EXPECT_THAT(run_program("vlp-station list --records " + database).output, HasSubstr("2 runs"));
-}
-
 /// Manual changes of the database are detected.
 TEST_F(VlpStationRecords, VerifyRecordsCommandFailsWhenRunWasChanged) {
   prepare("0001");

@@ -44,20 +44,6 @@ TEST_F(VlpStationSource, UsesFramesOfVideoAsBoardImages) {
   EXPECT_THAT(records("show").output, HasSubstr("images     48, 48 used"));
 }
 
-/// All frames are rejected and none is kept: the record has the reason.
-TEST_F(VlpStationSource, ReportsBlurWhenAllVideoFramesAreRejected) {
-  change("scene.yaml", "blur_px: 0.7", "blur_px: 2.5");
-  change("scene.yaml", "count: 16", "count: 6");
-  render("boards");
-  const std::string video = (folder / "boards.avi").string();
-  if (!write_video(video, images("boards"))) GTEST_SKIP() << "OpenCV writes no FFV1";
-  const auto result = run_program(run("a", "--idle-s 60 --source " + video));
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, HasSubstr("fails: the lens is blurred"));
-  EXPECT_THAT(result.output, HasSubstr("10 of 10 images refused: 10 blurred"));
-  EXPECT_THAT(records("show").output, HasSubstr("images     10, 0 used"));
-}
-
 TEST_F(VlpStationSource, CreatesNoCapturesFolderWhenSourceCannotBeOpened) {
   const auto camera = run_program(run("0001", "--source boards=/dev/video99"));
   EXPECT_EQ(camera.exit_code, 2);

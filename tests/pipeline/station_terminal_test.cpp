@@ -127,17 +127,6 @@ TEST_F(VlpStationTerminal, ShowsProgressAndVerdictOfUnit) {
   EXPECT_THAT(TemporaryFolder::read_content(folder / "log"), Not(HasSubstr("error")));
 }
 
-TEST_F(VlpStationTerminal, ShowsColorsAndEndsRunOnKeyQ) {
-  if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
-  const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
-  tmux.screen_with("Ctrl-C");
-  EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[1m"));
-  tmux.type("q");
-  EXPECT_THAT(tmux.screen_with("INVALID   camera"),
-              HasSubstr("boards: the operator ended the run"));
-  EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[31m"));
-}
-
 /// A shift: who measures, then unit after unit by a scanner, which types.
 TEST_F(VlpStationTerminal, ShowsUnitsOfShiftWithScannedSerials) {
   if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
@@ -171,20 +160,6 @@ TEST_F(VlpStationTerminal, ShowsUnitsOfShiftWithScannedSerials) {
               testing::AllOf(HasSubstr("operator   Ann\n"), HasSubstr("shift      early\n")));
 }
 
-/// The operator need not take the rest of the unit.
-TEST_F(VlpStationTerminal, ShowsFailureBeforeRemainingStepsHaveImages) {
-  if (run_program("tmux -V").exit_code != 0) GTEST_SKIP() << "tmux is not installed";
-  change("scene.yaml", "402.3, 297.4", "418.3, 285.4");
-  change("scene.yaml", "count: 16", "count: 12");
-  change("station.yaml", "board_views: 16", "board_views: 12");
-  render("boards");
-  prepare("0001");
-  drop("boards", 0, 12);
-  const Tmux tmux("PATH='" VLP_PROGRAMS_DIR "':$PATH " + run("0001", "") + " 2>/dev/null");
-  EXPECT_THAT(tmux.screen_with("Fails"),
-              testing::AllOf(HasSubstr("[x] boards"), HasSubstr("the lens is decentered")));
-}
-
 /// Lines of the screen with this text.
 int lines_with(const std::string& screen, const std::string& text) {
   int count = 0;
@@ -200,6 +175,7 @@ TEST_F(VlpStationTerminal, RedrawsScreenWhenTerminalIsResized) {
                   "-x 80 -y 24");
   const std::string keys = "q: verdict now";
   tmux.screen_with(keys);
+  EXPECT_THAT(tmux.screen("-e"), HasSubstr("\x1b[1m")) << "colors";
   tmux.resize("-x 60 -y 12");
   // It draws anew at once: the heading is at the top, the keys at the bottom, once each.
   for (int i = 0; i < 100 && !tmux.screen().starts_with("station-1"); ++i) {

@@ -6,8 +6,8 @@
 #include "captures/detections_table.h"
 #include "rig/calibration_error.h"
 #include "rig/lamp_map.h"
-#include "support/body_rig.h"
 #include "support/program.h"
+#include "support/random.h"
 #include "support/synthetic_rig.h"
 #include "support/temporary_folder.h"
 
@@ -93,78 +93,6 @@ TEST_F(VlpRotationByLamps, RefineMapRestoresTrueLampDistancesUpToScale) {
   EXPECT_EQ(
       read_calibration(folder / "leveled.yaml").history.back().options,
       "--lamps lamps.yaml --calibration camera.yaml --method lamps --refine-map refined.yaml");
-}
-
-/// One that drives at 1 m/s, by odometry in captures.csv, by its greatest speed, and left out.
-TEST_F(VlpRotationByLamps, TiltErrorDecreasesWithOdometryOrMaximumSpeed) {
-  BodyRig body{rig.map, rolling_calibration(), {}, {}};
-  body.calibration.rotation_center = rig.calibration.rotation_center;
-  rig.calibration.camera = body.calibration.camera;
-  std::vector<Frame> frames;
-  std::string captures = "image,vx_m_per_s,vy_m_per_s,velocity_sd_m_per_s,yaw_rate_rad_per_s\n";
-  for (int i = 0; i < 16; ++i) {
-    body.body.pose = {{random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3), 0}, 0.4 * i};
-    body.body.motion = {{std::cos(0.7 * i), std::sin(0.7 * i)}, 0.5, {0, 0}};
-    frames.push_back({std::to_string(i), with_noise(seen_from(body, 0.05), random)});
-    const Eigen::Vector2d& v = body.body.motion.velocity_m_per_s;
-    captures += frames.back().image + "," + std::to_string(v.x()) + "," + std::to_string(v.y()) +
-                ",0.01,0.5\n";
-  }
-  const auto error_rad = [&](const std::string& options) {
-    const auto result = level(frames, options);
-    EXPECT_EQ(result.exit_code, 0) << result.errors;
-    const Calibration written = read_calibration(folder / "leveled.yaml");
-    return (written.rotation_center->zenith_in_camera -
-            rig.calibration.rotation_center->zenith_in_camera)
-        .norm();
-  };
-  const double left_out = error_rad("");
-  const std::string odometry = "--captures " + folder.file("captures.csv", captures).string();
-  EXPECT_LT(error_rad(odometry), 0.2 * left_out);
-  const auto options = read_calibration(folder / "leveled.yaml").history.back().options;
-  EXPECT_THAT(options, HasSubstr("--captures captures.csv"));
-  EXPECT_LT(error_rad("--max-speed-m-per-s 2"), 0.3 * left_out);
-  rig.calibration.camera.row_time_s.reset();
-  for (const std::string& moves : {odometry, std::string("--max-speed-m-per-s 2")}) {
-    const auto refused = level(frames, moves);
-    EXPECT_EQ(refused.exit_code, 2);
-    EXPECT_THAT(refused.errors, HasSubstr("a moving camera needs row_time_s and readout"));
-  }
-}
-
-TEST_F(VlpRotationByLamps, RejectsTooFewOrEqualCapturesAndOtherMap) {
-  const auto one = level(drive(1));
-  EXPECT_EQ(one.exit_code, 3);
-  EXPECT_THAT(one.errors, HasSubstr("add captures"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "leveled.yaml"));
-  const auto alike = level({20, drive(1)[0]});
-  EXPECT_EQ(alike.exit_code, 2) << "one image twice is a file that is wrong: " << alike.errors;
-  auto frames = drive(1);
-  for (int i = 0; i < 9; ++i) frames.push_back({"again" + std::to_string(i), frames[0].detections});
-  EXPECT_THAT(level(frames).errors, HasSubstr("all captures have one position and yaw"));
-  frames = drive(5);
-  for (Frame& frame : frames) frame.detections.resize(2);
-  EXPECT_EQ(level(frames).exit_code, 3);
-  for (Lamp& lamp : surveyed.lamps) lamp.id += 100;
-  const auto other_map = level(drive(5));
-  EXPECT_EQ(other_map.exit_code, 2);
-  EXPECT_THAT(other_map.errors, HasSubstr("lamps.yaml: has none of the lamps"));
-}
-
-TEST_F(VlpRotationByLamps, RejectsOverwrittenInputsAndOptionsOfOtherMethods) {
-  EXPECT_EQ(level(drive(5), "--refine-map " + path("leveled.yaml")).exit_code, 2);
-  EXPECT_EQ(level(drive(5), "--refine-map " + path("lamps.yaml")).exit_code, 2);
-  EXPECT_EQ(level(drive(5), "--plot " + path("a.png")).exit_code, 2);
-  const auto axis = run_program("vlp-rotation " + path("detections.csv") + "--lamps " +
-                                path("lamps.yaml") + "--calibration " + path("camera.yaml") +
-                                "-o " + path("r.yaml") + "--refine-map " + path("s.yaml"));
-  EXPECT_EQ(axis.exit_code, 2);
-  EXPECT_THAT(axis.errors, HasSubstr("--refine-map needs --method lamps"));
-  const auto driving = run_program("vlp-rotation " + path("detections.csv") + "--lamps " +
-                                   path("lamps.yaml") + "--calibration " + path("camera.yaml") +
-                                   "-o " + path("r.yaml") + "--max-speed-m-per-s 1");
-  EXPECT_EQ(driving.exit_code, 2);
-  EXPECT_THAT(driving.errors, HasSubstr("--max-speed-m-per-s needs --method lamps"));
 }
 
 }  // namespace

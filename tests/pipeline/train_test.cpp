@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "captures/csv_reader.h"
 #include "rig/calibration.h"
+#include "support/csv_cells.h"
 #include "support/datasets.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
@@ -63,12 +63,10 @@ TEST_F(VlpTrain, ClassifierIdentifiesAllLampsInVlpDetectAndVlpLocate) {
   ASSERT_EQ(found.num_rows(), 12);
   for (std::size_t row = 0; row < found.num_rows(); ++row) {
     const auto matches = [&](std::size_t other) {
-      return found.get_cell_text(row, found.get_required_column("image")) ==
-                 truth.get_cell_text(other, truth.get_required_column("image")) &&
+      return read_text(found, row, "image") == read_text(truth, other, "image") &&
              found.get_cell_integer(row, found.get_required_column("lamp")) ==
                  truth.get_cell_integer(other, truth.get_required_column("lamp")) &&
-             std::abs(found.get_cell_number(row, found.get_required_column("u_px")) -
-                      truth.get_cell_number(other, truth.get_required_column("u_px"))) < 0.5;
+             std::abs(read_number(found, row, "u_px") - read_number(truth, other, "u_px")) < 0.5;
     };
     int matching = 0;
     for (std::size_t other = 0; other < truth.num_rows(); ++other) matching += matches(other);
@@ -78,36 +76,6 @@ TEST_F(VlpTrain, ClassifierIdentifiesAllLampsInVlpDetectAndVlpLocate) {
                                    output.string() + " -o " + (folder / "fixes.csv").string());
   EXPECT_EQ(located.exit_code, 0) << located.errors;
   EXPECT_THAT(located.output, HasSubstr("fixes       2\n"));
-}
-
-TEST_F(VlpTrain, WritesIdenticalClassifierForOneAndFourThreads) {
-  const std::string options = captures() + kLamps + kCalibration;
-  ASSERT_EQ(train(options + " --threads 1").exit_code, 0);
-  const std::string one = TemporaryFolder::read_content(output);
-  ASSERT_EQ(train(options + " --threads 4").exit_code, 0);
-  EXPECT_EQ(TemporaryFolder::read_content(output), one);
-}
-
-TEST_F(VlpTrain, NamesLampsWithTooFewLabeledLights) {
-  const auto result = train(kRig + "/sample" + kLamps);
-  EXPECT_EQ(result.exit_code, 3);
-  EXPECT_THAT(result.errors, HasSubstr("too few labeled lights of lamps 1 (has 2), 2 (has 2)"));
-  EXPECT_THAT(result.errors, HasSubstr("6 or more of each"));
-  EXPECT_FALSE(fs::exists(output));
-}
-
-TEST_F(VlpTrain, RejectsMissingLabelsAndLabelsOfUnknownLamps) {
-  fs::create_directory(folder / "bare");
-  fs::copy(kRig + "/sample/0000.png", folder / "bare/0000.png");
-  const auto result = train((folder / "bare").string() + kLamps);
-  EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, HasSubstr("bare: detections.csv is missing; add this table"));
-  folder.file("bare/mine.csv", "image,lamp,u_px,v_px\n0000.png,77,174.7,302.1\n");
-  const auto unknown = train((folder / "bare").string() + kLamps + " --labels mine.csv");
-  EXPECT_EQ(unknown.exit_code, 2);
-  EXPECT_THAT(unknown.errors,
-              HasSubstr("the labels contain lamp 77, which is not in the lamp map"));
-  EXPECT_EQ(run_program("vlp-train " + kRig + "/sample" + kLamps).exit_code, 2) << "no output";
 }
 
 TEST_F(VlpTrain, WritesTrueRowTimeAndReadoutFromUnlabeledImages) {
@@ -161,54 +129,6 @@ TEST_F(VlpTrain, LampPositionsDecideBetweenTwoFittingRowTimes) {
   EXPECT_THAT(swapped.errors, HasSubstr("neither duties nor positions of the lamps decide"));
 }
 
-/// The classifier is still trained, because it identifies lamps without the row time.
-TEST_F(VlpTrain, ReportsGivenAndMeasuredRowTimeWhenTheyDiffer) {
-  const std::string images = captures();
-  const std::string right = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
-  const std::string stated = "row_time_s: 0.00003";
-  ASSERT_NE(right.find(stated), std::string::npos);
-  for (const std::string wrong_us : {"28.5", "37.5"}) {
-    std::string wrong = right;
-    wrong.replace(wrong.find(stated), stated.size(), "row_time_s: " + wrong_us + "e-06");
-    const std::string calibration =
-        " --calibration " + folder.file("wrong.yaml", wrong).string() + kLamps;
-    const auto both = testing::ContainsRegex("row time is " + wrong_us +
-                                             " us in the calibration, but the stripes of 6 lamps "
-                                             "measure (29[.]9|30[.]0)");
-    const auto trained = train(images + calibration);
-    EXPECT_EQ(trained.exit_code, 0);
-    EXPECT_THAT(trained.errors, both);
-    const auto located =
-        run_program("vlp-locate " + kRig + "/sample" + calibration + " --classifier " +
-                    output.string() + " -o " + (folder / "fixes.csv").string());
-    EXPECT_EQ(located.exit_code, 0);
-    EXPECT_THAT(located.errors, HasSubstr("row time is " + wrong_us + " us in wrong.yaml, but"));
-    const auto row_time = train("--row-time " + images + calibration);
-    EXPECT_EQ(row_time.exit_code, 0);
-    EXPECT_THAT(row_time.errors, both);
-  }
-  EXPECT_THAT(train(images + kLamps + kCalibration).errors, testing::Not(HasSubstr("row time")));
-}
-
-TEST_F(VlpTrain, ExitsWith3WhenFrequenciesFitSeveralRowTimes) {
-  std::string map = "format: vlp-lamps/1\nlamps:\n";
-  for (int id = 1; id <= 9; ++id) {
-    map += "  - {id: " + std::to_string(id) + ", position_m: [" + std::to_string(id) +
-           ", 0, 2], frequency_hz: " + std::to_string(1000 * std::pow(1.244, id)) + "}\n";
-  }
-  const auto result = train("--row-time " + kRig + "/sample" + kCalibration + " --lamps " +
-                            folder.file("even.yaml", map).string());
-  EXPECT_EQ(result.exit_code, 3) << result.output;
-  EXPECT_THAT(result.errors, HasSubstr("fit a row time of"));
-  EXPECT_FALSE(fs::exists(output));
-  const auto labeled = run_program("vlp-train --row-time " + kRig + "/sample" + kLamps +
-                                   " --labels true_detections.csv");
-  EXPECT_EQ(labeled.exit_code, 0) << labeled.errors;
-  const auto nowhere = train("--row-time " + kRig + "/sample" + kLamps);
-  EXPECT_EQ(nowhere.exit_code, 2);
-  EXPECT_THAT(nowhere.errors, HasSubstr("add --calibration"));
-}
-
 TEST_F(VlpTrain, VlpDetectEstimatesColumnReadoutWhenCalibrationHasNone) {
   const std::string wide = VLP_SOURCE_DIR "/datasets/wide/rendered";
   std::string calibration = TemporaryFolder::read_content(wide + "/true_calibration.yaml");
@@ -227,38 +147,6 @@ TEST_F(VlpTrain, VlpDetectEstimatesColumnReadoutWhenCalibrationHasNone) {
   EXPECT_EQ(run_program(command + " --readout diagonal").exit_code, 2);
 }
 
-TEST_F(VlpTrain, ProgramsRejectClassifierOfOtherLampsOrRowTime) {
-  ASSERT_EQ(train(captures() + kLamps + kCalibration).exit_code, 0);
-  const auto refusal = [&](const std::string& lamps, const std::string& calibration) {
-    const auto result =
-        run_program("vlp-detect " + kRig + "/sample" + lamps + calibration + " --classifier " +
-                    output.string() + " -o " + (folder / "found.csv").string());
-    EXPECT_EQ(result.exit_code, 2);
-    EXPECT_FALSE(fs::exists(folder / "found.csv"));
-    return result.errors;
-  };
-  EXPECT_THAT(
-      refusal(" --lamps " VLP_SOURCE_DIR "/datasets/wide/rendered/lamps.yaml", kCalibration),
-      HasSubstr("trained.yaml: lamp 1 is not in"));
-  std::string calibration = TemporaryFolder::read_content(kRig + "/true_calibration.yaml");
-  calibration.replace(calibration.find("0.00003"), 7, "0.00004");
-  EXPECT_THAT(refusal(kLamps, " --calibration " + folder.file("other.yaml", calibration).string()),
-              HasSubstr("trained.yaml: row_time_s is 3e-05"));
-  EXPECT_THAT(refusal(kLamps + " --classifier none.yaml", kCalibration), HasSubstr("--classifier"));
-  const auto located = run_program(
-      "vlp-locate " + kRig +
-      "/sample --lamps " VLP_SOURCE_DIR "/datasets/wide/rendered/lamps.yaml" + kCalibration +
-      " --classifier " + output.string() + " -o " + (folder / "fixes.csv").string());
-  EXPECT_EQ(located.exit_code, 2);
-  EXPECT_THAT(located.errors, HasSubstr("trained.yaml: lamp 1 is not in"));
-  EXPECT_FALSE(fs::exists(folder / "fixes.csv"));
-  const auto table =
-      run_program("vlp-locate " + kRig + "/sample/true_detections.csv" + kLamps + kCalibration +
-                  " --classifier " + output.string() + " -o " + (folder / "fixes.csv").string());
-  EXPECT_EQ(table.exit_code, 2);
-  EXPECT_THAT(table.errors, HasSubstr("is no folder of images"));
-}
-
 TEST_F(VlpTrain, VlpDetectWarnsOfInseparableLampsWithoutClassifier) {
   std::string map = TemporaryFolder::read_content(kRig + "/lamps.yaml");
   map.replace(map.find("2000"), 4, "1620");
@@ -269,13 +157,6 @@ TEST_F(VlpTrain, VlpDetectWarnsOfInseparableLampsWithoutClassifier) {
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.errors, HasSubstr("lamps 1 and 2 may remain unidentified from z = 0"));
   EXPECT_EQ(std::count(result.errors.begin(), result.errors.end(), '\n'), 1) << result.errors;
-  const auto smeared = run_program(command + " --exposure-s 2e-4");
-  EXPECT_THAT(smeared.errors, HasSubstr("lamp 6 has"));
-  EXPECT_THAT(smeared.errors, HasSubstr("expose shorter"));
-  EXPECT_THAT(run_program("vlp-detect " + kRig + "/sample" + kCalibration + kLamps + " -o " +
-                          (folder / "found.csv").string())
-                  .errors,
-              "");
 }
 
 }  // namespace

@@ -113,32 +113,5 @@ TEST_F(VlpDetectVideo, RejectsUnusableVideosWithOneLineErrorAndWarnsOfTruncatedO
 
 class BoardVideo : public VlpIntrinsics {};
 
-TEST_F(BoardVideo, VlpIntrinsicsYieldsSameCornersAsForImages) {
-  const std::string rig = (folder / "rig").string(), board = rig + "/board.yaml";
-  std::string scene =
-      TemporaryFolder::read_content(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
-  scene = with(scene, "views: {count: 36", "views: {count: 12");
-  ASSERT_EQ(run_program("vlp-simulate -q " + folder.file("scene.yaml", scene).string() +
-                        " --only boards -o " + rig)
-                .exit_code,
-            0);
-  const std::string film = (folder / "boards.avi").string();
-  if (!write_video_of_folder(film, rig + "/boards", 2)) GTEST_SKIP() << "OpenCV writes no FFV1";
-  // Few views: gates are not met.
-  const auto of_images = calibrate(rig + "/boards", board);
-  ASSERT_LE(of_images.exit_code, 1) << of_images.errors;
-  const std::string corners = content("camera.corners.vnl");
-  const auto of_film = calibrate(film, board);
-  EXPECT_EQ(of_film.exit_code, of_images.exit_code) << of_film.errors;
-  EXPECT_THAT(of_film.errors, HasSubstr("vlp-intrinsics: warning: boards.avi: 12 of its frames: "
-                                        "the same image again; skipped\n"));
-  std::string names = content("camera.corners.vnl");
-  for (int i = 0; i < 12; ++i) {
-    const auto number = [](int n) { return (n < 10 ? "0" : "") + std::to_string(n); };
-    names = with(names, "boards.avi#0000" + number(2 * i), "00" + number(i) + ".png");
-  }
-  EXPECT_EQ(names, corners);
-}
-
 }  // namespace
 }  // namespace vlp
