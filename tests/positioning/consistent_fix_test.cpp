@@ -23,13 +23,16 @@ class NormalizedErrors {
         wrap_angle_rad(fix.state.pose.yaw_rad - truth.yaw_rad);
     const Eigen::Matrix4d covariance = fix.pose_covariance();
     joint_ += error.dot(covariance.ldlt().solve(error)) / 4;
+    each_ += error.array().square() / covariance.diagonal().array();
     ++count_;
   }
   int count() const { return count_; }
   double joint() const { return joint_ / count_; }
+  Eigen::Array4d each() const { return each_ / count_; }
 
  private:
   double joint_ = 0;
+  Eigen::Array4d each_ = Eigen::Array4d::Zero();
   int count_ = 0;
 };
 
@@ -132,6 +135,30 @@ TEST_F(PositionerPriors, SurveySdKeepsLampsOfCorrectMapIfLensErrorsAreUnknown) {
     }
   }
   EXPECT_GT(fixes, 250);
+}
+
+/// The joint covariance includes effects of second order, which exceed the noise of the pixels.
+TEST_F(PositionerPriors, JointCovarianceOfOneLampMatchesErrorsUpToYawSdOf3Deg) {
+  rig.map.lamps.resize(1);
+  const auto exact = seen_from(rig, 0.05);
+  const Positioner positioner = rig.positioner();
+  Random random(21);
+  for (const double yaw_sd_deg : {1.0, 2.0, 3.0}) {
+    for (const double height_sd_m : {0.02, 0.05}) {
+      const double yaw_sd_rad = rad_from_deg(yaw_sd_deg);
+      NormalizedErrors errors;
+      for (int i = 0; i < 10000; ++i) {
+        Sensors sensors;
+        sensors.height_and_yaw =
+            HeightAndYaw{height_sd_m * random.normal(), 0.4 + yaw_sd_rad * random.normal(),
+                         height_sd_m, yaw_sd_rad};
+        errors.add(positioner.compute_position_fix(with_noise(exact, random), sensors),
+                   rig.body.pose);
+      }
+      EXPECT_NEAR(errors.joint(), 1, 0.05) << yaw_sd_deg << " deg, " << height_sd_m << " m";
+      EXPECT_LT((errors.each() - 1).abs().maxCoeff(), 0.05);
+    }
+  }
 }
 
 /// Fixes of three lamps with free roll and pitch.
