@@ -58,10 +58,12 @@ Calibration remove_dispersion_from_calibration(Calibration calibration) {
   calibration.dispersion.reset();
   remove_history(calibration, "dispersion");
   if (auto& joint = calibration.covariance; joint && joint->find_row(kOffsetParameter)) {
-    const bool keeps_lamps = calibration.adjustment.has_value();
-    const Eigen::Index rows =
-        keeps_lamps ? std::ssize(joint->parameters) - 2 : joint->first_lamp_row();
-    if (!keeps_lamps) joint->lamps.clear();
+    Eigen::Index rows = std::ssize(joint->parameters) - 2;
+    // add_offset_to_covariance() appends lamps that are independent of all earlier parameters.
+    while (!joint->lamps.empty() && joint->matrix.block(rows - 3, 0, 3, rows - 3).isZero(0)) {
+      joint->lamps.pop_back();
+      rows -= 3;
+    }
     joint->parameters.resize(static_cast<std::size_t>(rows));
     joint->matrix.conservativeResize(rows, rows);
   }

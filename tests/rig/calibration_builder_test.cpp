@@ -71,19 +71,21 @@ TEST(AddDispersionToCalibration, ReplacesDispersionAndKeepsOtherParts) {
               expected);
 }
 
+/// Lamp 7 is correlated with the zenith, as in an adjustment; lamp 8 with the offset only.
 TEST(RemoveDispersionFromCalibration, RemovesRowsOfOffsetAndOfItsLampsButKeepsAdjustedLamps) {
   Calibration calibration = whole_calibration();
+  calibration.adjustment = Adjustment{{"rotation"}, 12, 70, 0.05};
   JointCovariance& joint = *calibration.covariance;
-  const JointCovariance without_offset = joint;
-  append_parameters(joint, list_pair_names(kOffsetParameter), Eigen::MatrixXd::Ones(2, 5),
-                    Eigen::MatrixXd::Identity(2, 2));
-  Calibration expected = whole_calibration();
+  joint.matrix.topRightCorner<2, 3>().setConstant(1e-7);
+  joint.matrix.bottomLeftCorner<3, 2>().setConstant(1e-7);
+  Calibration expected = calibration;
   expected.dispersion.reset();
   expected.history.pop_back();
-  expected.covariance = {{}, {"zenith_x", "zenith_y"}, without_offset.matrix.topLeftCorner<2, 2>()};
-  expect_same(remove_dispersion_from_calibration(calibration), expected);
-  calibration.adjustment = expected.adjustment = Adjustment{{"rotation"}, 12, 70, 0.05};
-  expected.covariance = without_offset;
+  joint.lamps.push_back({8, {0.5, 0, 2.1}});
+  append_parameters(joint, list_lamp_parameter_names(8), Eigen::MatrixXd::Zero(3, 5),
+                    1e-6 * Eigen::MatrixXd::Identity(3, 3));
+  append_parameters(joint, list_pair_names(kOffsetParameter), Eigen::MatrixXd::Ones(2, 8),
+                    Eigen::MatrixXd::Identity(2, 2));
   expect_same(remove_dispersion_from_calibration(calibration), expected);
 }
 
