@@ -159,9 +159,10 @@ std::optional<JointCovariance> compute_joint_covariance(
     return add_offset_to_covariance(std::move(joint), fit, *jacobian_wrt_steps,
                                     leveled.camera.focal_px());
   }
-  result.warnings.emplace_back(
-      "the effect of lens and zenith errors on the offset cannot be determined, and sd of fixes "
-      "will lack those of the offset; use vlp-adjust");
+  result.warnings.push_back(fmt::format(
+      "the effect of lens and zenith errors on the offset cannot be determined, and the "
+      "sd of fixes will not contain the error of the offset: add captures at other yaws{}",
+      leveled.adjustment ? "" : ", or use vlp-adjust"));
   return leveled.covariance;
 }
 
