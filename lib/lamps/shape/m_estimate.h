@@ -29,20 +29,8 @@ template <int N>
 struct MEstimateStep {
   /// Step to subtract from the parameters.
   Eigen::Matrix<double, N, 1> step;
-  /// Inverse of the normal equations, and the variance of a point of weight 1 from the scatter of
-  /// the points on the curve.
-  Eigen::Matrix<double, N, N> inverse;
-  double variance;
-  /// True for each point that is an inlier, by its index, and number of inliers.
+  /// True for each point that is an inlier, by its index.
   std::vector<bool> inliers;
-  int count;
-  /// Sum of the weights, including those of the biweight.
-  double sum_of_weights;
-
-  /// Returns the covariance of the parameters. The variance of a point is at least `min_variance`.
-  Eigen::Matrix<double, N, N> parameter_covariance(double min_variance = 0) const {
-    return std::max(variance, min_variance) * inverse;
-  }
 };
 
 /// Computes a Gauss-Newton step from `distance(i)`, the CurveDistance of point i, for
@@ -69,35 +57,25 @@ std::optional<MEstimateStep<N>> compute_m_estimate_step(std::span<const double> 
   const double cut =
       std::min(4 * tolerance, tukey * std::max(sigma_from_median * median, tolerance / 10));
 
-  MEstimateStep<N> result{{}, {}, 0, std::vector<bool>(weights.size()), 0, 0};
+  MEstimateStep<N> result{{}, std::vector<bool>(weights.size())};
   Normal<std::size_t(N)> normal;
-  double all = 0, psi_squares = 0, slopes = 0;
+  int count = 0;
+  double slopes = 0;
   for (std::size_t i = 0; i < weights.size(); ++i) {
     const auto& [error, slope] = distances[i];
     const double relative_error = error / cut;
     result.inliers[i] = std::abs(relative_error) < 1;
     if (!result.inliers[i]) continue;
     const double inside = 1 - relative_error * relative_error;
-    const double weight = weights[i] * inside * inside;
-    all += weights[i];
-    psi_squares += weights[i] * std::pow(inside * inside * error, 2);
     slopes += weights[i] * inside * (1 - 5 * relative_error * relative_error);
-    normal.add_residual_row(slope, error, weight);
-    result.sum_of_weights += weight;
-    ++result.count;
+    normal.add_residual_row(slope, error, weights[i] * inside * inside);
+    ++count;
   }
-  if (result.count < min_points || !(slopes > 0)) return std::nullopt;
+  if (count < min_points || !(slopes > 0)) return std::nullopt;
   const Cholesky<std::size_t(N)> factor(normal);
   if (!factor.has_full_rank(1e-12)) return std::nullopt;
   const auto step = factor.solve_normal_equations(normal.gradient);
   std::copy(step.begin(), step.end(), result.step.begin());
-  // Variance of an M-estimate: the mean of psi^2 over the squared mean of its slope.
-  result.variance =
-      psi_squares * all / (slopes * slopes) * result.sum_of_weights / (result.count - N);
-  for (int i = 0; i < N; ++i) {
-    const auto column = factor.compute_inverse_column(std::size_t(i));
-    std::copy(column.begin(), column.end(), result.inverse.col(i).begin());
-  }
   return result;
 }
 
