@@ -10,32 +10,15 @@
 #include <vector>
 
 #include "geometry/median.h"
-#include "geometry/statistical_bounds.h"
 
-/// Robust variance of residuals with outliers, from the median, and the bound above which a
-/// residual is an outlier. Valid for samples of any size. "Linear" residuals have one coordinate,
-/// "planar" residuals two.
+/// Robust variance of residuals in the plane with outliers, from the median, and the bound above
+/// which a residual is an outlier. Valid for samples of any size.
 ///
-/// Let residuals be normal with variance sigma^2 per coordinate. The median of the squares is then
-/// q^2 sigma^2 with q = 0.6745 (linear), or 2 ln 2 sigma^2 (planar). Least squares with nu degrees
-/// of freedom reduce the variance of the residuals by the factor nu / (number of coordinates). The
-/// variance estimated from the median is as uncertain as a variance of m degrees of freedom: m = 2
-/// n (2 q phi(q))^2 (linear), 2 n ln^2 2 (planar), where n is nu or nu / 2.
+/// Let residuals be normal with variance sigma^2 per coordinate. The median of the squared lengths
+/// is then 2 ln 2 sigma^2. Least squares with nu degrees of freedom reduce the variance of the
+/// residuals by the factor nu / (number of coordinates). The variance estimated from the median is
+/// as uncertain as a variance of m = nu ln^2 2 degrees of freedom.
 namespace vlp {
-
-/// Estimates the variance of the errors from the median of the squared residuals, for residuals of
-/// one coordinate. Outliers barely affect it.
-///
-/// @param squares             squared residuals, not empty, in any unit squared
-/// @param degrees_of_freedom  number of residuals minus number of unknowns; at least 1 is assumed
-/// @return                    variance, in the unit of `squares`; consistent for normal errors
-inline double estimate_robust_variance_1d(std::vector<double> squares, double degrees_of_freedom) {
-  assert(!squares.empty());
-  constexpr double median_of_unit_variance = 0.454936;  // 0.67449^2
-  const double rows = static_cast<double>(squares.size());
-  return upper_median(std::move(squares)) / median_of_unit_variance * rows /
-         std::max(degrees_of_freedom, 1.0);
-}
 
 /// Estimates the variance of the errors per axis from the median of the squared lengths of
 /// residuals in the plane. Outliers barely affect it.
@@ -51,16 +34,8 @@ inline double estimate_robust_variance_2d(std::vector<double> squares, double de
          std::max(degrees_of_freedom, 1.0);
 }
 
-/// Computes the outlier bound of squared linear residuals, in units of
-/// estimate_robust_variance_1d(). Normal residuals exceed it as rarely as they exceed sigmas^2 if
-/// the variance is known.
-inline double compute_squared_outlier_bound_1d(double sigmas, double degrees_of_freedom) {
-  constexpr double m_per_residual = 0.367540;  // 2 (2 q phi(q))^2
-  return compute_squared_student_t_bound(sigmas,
-                                         m_per_residual * std::max(degrees_of_freedom, 1.0));
-}
-
-/// Computes the same bound for planar residuals, in units of estimate_robust_variance_2d().
+/// Computes the outlier bound of squared lengths, in units of estimate_robust_variance_2d(). Normal
+/// residuals exceed it as rarely as they exceed sigmas^2 if the variance is known.
 ///
 /// Half the quotient is F(2, m), and the quotient exceeds x with the probability
 /// (1 + x / m)^(-m / 2): x = m (exp(sigmas^2 / m) - 1).

@@ -30,13 +30,10 @@ std::string_view rotation_method_name(RotationMethod method) {
 
 RotationFit fit_rotation(const RotationCaptures& rotation, const Camera& camera,
                          RotationMethod method) {
-  switch (method) {
-    case RotationMethod::axis:
-      return fit_rotation_axis(rotation, camera);
-    case RotationMethod::circle:
-      break;
-  }
-  return fit_and_average_lamp_circle_centers(rotation, camera).mean;
+  const RotationFit axis = fit_rotation_axis(rotation, camera);
+  return method == RotationMethod::axis
+             ? axis
+             : fit_and_average_lamp_circle_centers(rotation, camera, axis).mean;
 }
 
 /// Returns the zenith point and, if known, the lever arm.
@@ -246,8 +243,9 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
     }
     return result;
   }
-  result.circles = fit_and_average_lamp_circle_centers(result.rotation, camera);
-  result.fit = fit_rotation(result.rotation, camera, method);
+  const RotationFit axis = fit_rotation_axis(result.rotation, camera);
+  result.circles = fit_and_average_lamp_circle_centers(result.rotation, camera, axis);
+  result.fit = method == RotationMethod::axis ? axis : result.circles.mean;
   if (!result.fit.converged) {
     const bool is_noise = method == RotationMethod::circle && result.circles.undetermined > 0;
     result.set_step_failure(

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "calibration/map/lamp_displacements.h"
+#include "calibration/map/map_errors.h"
 #include "evaluation/gate.h"
 #include "frontend/observation.h"
 #include "report/plots/gnuplot.h"

@@ -149,6 +149,7 @@ class ProblemAssembler {
         all_(make_empty_problem(input, pivots_.size())),
         sums_m_(pivots_.size(), Eigen::Vector3d::Zero()),
         num_captures_(pivots_.size(), 0) {
+    problem_.is_zenith_exact = input.zenith_is_exact;
     set_lamps();
     set_tilt_and_lever_arm();
   }
@@ -339,23 +340,28 @@ std::vector<double> compute_residual_norms(const AdjustmentProblem& problem) {
 }
 
 /// Rejects detections beyond the scatter of the residuals, estimated from their median, and
-/// reinstates the other ones. Returns true if the set of used detections changes.
+/// reinstates the other ones. Rejects only those beyond half the largest residual, because an
+/// outlier also changes the residuals of other detections. Returns true if the set of used
+/// detections changes.
 bool update_inliers(AdjustmentProblem& problem, bool noise_is_stated, double degrees_of_freedom) {
-  constexpr double rounding = 1e-6;  // standard deviations
   const std::vector<double> lengths = compute_residual_norms(problem);
   std::vector<double> squares;
+  double worst = 0;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
-    if (problem.sightings[i].used) squares.push_back(lengths[i] * lengths[i]);
+    if (!problem.sightings[i].used) continue;
+    squares.push_back(lengths[i] * lengths[i]);
+    worst = std::max(worst, lengths[i]);
   }
   if (squares.empty()) return false;
   const double scatter =
       std::sqrt(estimate_robust_variance_2d(std::move(squares), degrees_of_freedom) *
                 compute_squared_outlier_bound_2d(kDetectionOutlierSigmas, degrees_of_freedom));
   const double limit =
-      std::max(scatter, kDetectionOutlierSigmas * (noise_is_stated ? 1 : rounding));
+      std::max(scatter, kDetectionOutlierSigmas *
+                            (noise_is_stated ? 1 : kMinNoise_px / problem.noise_scale));
   bool changed = false;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
-    const bool use = lengths[i] <= limit;
+    const bool use = lengths[i] <= (problem.sightings[i].used ? std::max(limit, worst / 2) : limit);
     changed |= use != problem.sightings[i].used;
     problem.sightings[i].used = use;
   }
@@ -577,10 +583,16 @@ std::string explain_undetermined(const AdjustmentProblem& problem,
 /// the solution fails.
 bool solve_robustly(AssembledProblem& all, Contradictions& contradictions) {
   AdjustmentProblem& problem = all.problem;
-  if (!problem.solve_adjustment(true) || !problem.solve_adjustment(true)) return false;
+  // A wide loss brings lamps and poses near their solution, from where the narrow one continues.
+  constexpr double wide_scale = 30;
+  problem.noise_scale = wide_scale;
+  bool is_solved = problem.solve_adjustment(true);
+  problem.noise_scale = 1;
+  is_solved = is_solved && problem.solve_adjustment(true);
+  if (!is_solved) return false;
   contradictions.reject_far_observations();
-  update_inliers(problem, all.noise_is_stated,
-                 problem.compute_global_unknowns_covariance().degrees_of_freedom);
+  // The loss assumes a noise of 1 px if none is stated, and outliers bias its solution by less.
+  update_inliers(problem, true, problem.compute_global_unknowns_covariance().degrees_of_freedom);
   return true;
 }
 
@@ -848,8 +860,9 @@ AdjustmentResult run_bundle_adjustment(const AdjustmentInput& all_lamps,
   const Eigen::MatrixXd& covariance = adjusted->matrix;
   set_detection_residuals(all, input.lamps, adjusted->degrees_of_freedom, result);
   bool has_lever_arm = false;
-  result.undetermined = explain_undetermined(problem, covariance, compute_mean_height_m(problem),
-                                             limits, has_lever_arm);
+  result.lamp_height_m = compute_mean_height_m(problem);
+  result.undetermined =
+      explain_undetermined(problem, covariance, result.lamp_height_m, limits, has_lever_arm);
   set_adjusted_rotation_center(problem, has_lever_arm, result);
   set_adjusted_joint_covariance(problem, covariance, has_lever_arm, result);
   set_adjusted_map(all, input.lamps, contradictions, result);

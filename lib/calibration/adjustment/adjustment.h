@@ -93,6 +93,8 @@ struct AdjustmentInput {
   /// Estimates the lever arm if captures of a pivot or positions of the axis depend on it.
   /// Otherwise it keeps its value in the calibration, or zero.
   bool estimates_lever_arm = true;
+  /// Keeps the zenith of the calibration.
+  bool zenith_is_exact = false;
   /// Set if the captures were checked separately and contain no gross outliers. Skips the robust
   /// start, which rejects all detections of a lamp whose exact position in the map is wrong.
   bool captures_are_checked = false;
@@ -187,6 +189,8 @@ struct AdjustmentResult {
     bool is_used;
   };
   std::vector<DetectionResidual> residuals;
+  /// Mean height of the used lamps above the camera.
+  double lamp_height_m = 0;
   /// RMS residual of the used detections per axis, in px: sqrt(sum of squares / degrees of
   /// freedom).
   double residual_px = 0;

@@ -259,7 +259,8 @@ AdjustmentResidual AdjustmentProblem::linearize_gauge_constraint() const {
   return at;
 }
 
-bool AdjustmentProblem::is_lamp_position_exact(Eigen::Index first) const {
+bool AdjustmentProblem::is_block_exact(Eigen::Index first) const {
+  if (first == layout_.zenith) return is_zenith_exact;
   return first >= layout_.lamps && first < layout_.pivots &&
          lamps[static_cast<std::size_t>(first - layout_.lamps) / 3].is_exact();
 }
@@ -371,7 +372,7 @@ bool AdjustmentProblem::solve_adjustment(bool robust) {
       double* const block = blocks.emplace_back(state_.data() + first);
       ceres.AddParameterBlock(block, static_cast<int>(jacobian.cols()));
       order->AddElementToGroup(block, first < layout_.global ? 1 : 0);
-      if (is_lamp_position_exact(first)) ceres.SetParameterBlockConstant(block);
+      if (is_block_exact(first)) ceres.SetParameterBlockConstant(block);
     }
     ceres::LossFunction* const loss =
         robust && term.has_loss ? new ceres::CauchyLoss(width) : nullptr;
@@ -479,7 +480,7 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_unknowns_c
   for (const Term& term : make_least_squares_terms(lens)) {
     auto at = term.linearize();
     if (!at) continue;
-    std::erase_if(at->blocks, [&](const auto& part) { return is_lamp_position_exact(part.first); });
+    std::erase_if(at->blocks, [&](const auto& part) { return is_block_exact(part.first); });
     if (term.capture) {
       rows[*term.capture].add(*at, term.is_detection, captures[*term.capture].local);
       continue;
@@ -498,8 +499,9 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_unknowns_c
                              Eigen::MatrixXd::Identity(layout_.global, layout_.global));
   covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
+  if (is_zenith_exact) covariance.diagonal().segment<2>(layout_.zenith).setZero();
   for (std::size_t i = 0; i < lamps.size(); ++i) {
-    if (is_lamp_position_exact(layout_.lamp_state_index(i)))
+    if (is_block_exact(layout_.lamp_state_index(i)))
       covariance.diagonal().segment<3>(layout_.lamp_state_index(i)).setZero();
   }
   double freedom = 0;

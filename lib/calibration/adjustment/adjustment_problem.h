@@ -139,6 +139,8 @@ class AdjustmentProblem {
   std::vector<bool> is_known_position_used;
   /// True if some residual depends on the lever arm, and the lever arm is estimated.
   bool has_lever_arm = false;
+  /// True if the zenith keeps its initial value.
+  bool is_zenith_exact = false;
   /// Factor by which all sigma_px are multiplied.
   double noise_scale = 1;
 
@@ -191,8 +193,8 @@ class AdjustmentProblem {
   AdjustmentResidual linearize_motion_prior(const Capture& capture) const;
   AdjustmentResidual linearize_lamp_prior(std::size_t lamp) const;
   AdjustmentResidual linearize_gauge_constraint() const;
-  /// Returns true if the block of the state is a lamp with an exact position.
-  bool is_lamp_position_exact(Eigen::Index first) const;
+  /// Returns true if the block of the state is exact: the zenith, or the position of a lamp.
+  bool is_block_exact(Eigen::Index first) const;
   /// Returns the information of the global unknowns without a prior, for a guess.
   Eigen::MatrixXd make_weak_prior_information_matrix() const;
 

@@ -12,9 +12,10 @@
 #include <tuple>
 #include <utility>
 
-#include "camera/lens.h"
+#include "calibration/adjustment/adjustment.h"
 #include "geometry/frames.h"
 #include "geometry/median.h"
+#include "geometry/plane.h"
 #include "geometry/similarity.h"
 #include "geometry/symmetric.h"
 #include "positioning/correction.h"
@@ -27,28 +28,29 @@ namespace {
 /// Probability of a false alarm per map.
 constexpr double kFalseAlarm = 0.01;
 
-/// Ray (z, 1) to a lamp in the level frame of the camera.
-struct LevelRay {
-  const Lamp* lamp;
-  Eigen::Vector2d z;
-};
+/// Displacements of the lamps according to the captures.
+struct LampDisplacements {
+  std::vector<int> lamps = {};
+  std::vector<Eigen::Vector2d> map_m = {};
+  /// Number of used captures of each lamp.
+  std::vector<int> captures = {};
+  /// Residuals of the detections rejected as outliers, by lamp, in px.
+  std::map<int, std::vector<double>> outliers_px = {};
+  /// Displacement (x, y) of each lamp in the world, two rows per lamp, in the order of `lamps`.
+  Eigen::VectorXd displacement_m = {};
+  /// Covariance of the displacements; projector onto the displacements that are no similarity of
+  /// the map.
+  Eigen::MatrixXd covariance_m2 = {}, projector = {};
+  /// Mean height of the lamps above the camera.
+  double height_m = 0;
+  /// Fraction of the detections that is used.
+  double inlier_fraction = 1;
 
-/// Returns the rays to the lamps of the map. Omits lamps that are detected twice.
-std::vector<LevelRay> compute_level_rays(const Frame& frame, const LampMap& map, const Lens& lens,
-                                         const Eigen::Matrix3d& level_from_camera) {
-  std::vector<LevelRay> rays;
-  std::map<int, int> counts;
-  for (const Detection& detection : frame.detections) ++counts[detection.lamp];
-  for (const Detection& detection : frame.detections) {
-    const Lamp* lamp = find_lamp_by_id(map.lamps, detection.lamp);
-    if (lamp == nullptr || counts[lamp->id] > 1) continue;
-    const auto ray = lens.unproject_pixel(detection.pixel);
-    if (!ray) continue;
-    const Eigen::Vector3d level = level_from_camera * ray->direction;
-    if (level.z() > 0) rays.push_back({lamp, level.hnormalized()});
+  /// Returns the displaced position of a lamp, up to a similarity of all lamps.
+  Eigen::Vector2d displaced_lamp_position_m(std::size_t lamp) const {
+    return map_m[lamp] + displacement_m.segment<2>(2 * static_cast<Eigen::Index>(lamp));
   }
-  return rays;
-}
+};
 
 double rms_radius(const std::vector<Eigen::Vector2d>& points) {
   Eigen::Vector2d sum(0, 0);
@@ -61,58 +63,46 @@ double rms_radius(const std::vector<Eigen::Vector2d>& points) {
   return std::sqrt(std::max(0.0, squares / count - (sum / count).squaredNorm()));
 }
 
-using LampPositions = std::map<int, Eigen::Vector2d>;
-
-/// Returns the displaced positions of the lamps, scaled to the size of the map.
-std::vector<Eigen::Vector2d> compute_displaced_positions(const LampDisplacements& found) {
-  Eigen::Vector2d mean_m(0, 0);
-  std::vector<Eigen::Vector2d> positions_m;
-  for (std::size_t i = 0; i < found.lamps.size(); ++i) {
-    positions_m.push_back(found.displaced_lamp_position_m(i));
-    mean_m += positions_m.back() / static_cast<double>(found.lamps.size());
+/// Returns an orthonormal basis of the displacements of points by shift, rotation and scale.
+Eigen::MatrixXd make_similarity_basis(const std::vector<Eigen::Vector2d>& points) {
+  Eigen::Vector2d mean(0, 0);
+  for (const Eigen::Vector2d& point : points) mean += point / static_cast<double>(points.size());
+  Eigen::MatrixXd moves(2 * std::ssize(points), 4);
+  for (Eigen::Index i = 0; i < std::ssize(points); ++i) {
+    const Eigen::Vector2d p = points[static_cast<std::size_t>(i)] - mean;
+    moves.middleRows<2>(2 * i) << 1, 0, -p.y(), p.x(), 0, 1, p.x(), p.y();
   }
-  const double scale = rms_radius(found.map_m) / rms_radius(positions_m);
-  for (Eigen::Vector2d& displaced_position_m : positions_m)
-    displaced_position_m = mean_m + scale * (displaced_position_m - mean_m);
-  return positions_m;
+  return moves.colwise().normalized();
 }
 
-/// Projects the rays onto the ceiling from the camera pose that fits the displaced lamps best. The
-/// height is the ratio of the sizes of both patterns, so that errors of the map barely change it.
-std::optional<CeilingView> project_rays_to_ceiling(const std::vector<LevelRay>& rays,
-                                                   const LampPositions& positions_m) {
-  std::vector<Eigen::Vector2d> z, lamps_m;
-  double mean_z_m = 0;
-  for (const LevelRay& ray : rays) {
-    lamps_m.push_back(positions_m.at(ray.lamp->id));
-    z.push_back(ray.z);
-    mean_z_m += ray.lamp->position_m.z() / static_cast<double>(rays.size());
+std::size_t count_detections(const std::vector<AdjustmentCapture>& captures) {
+  std::size_t count = 0;
+  for (const AdjustmentCapture& capture : captures) count += capture.detections.size();
+  return count;
+}
+
+std::map<int, int> count_captures_of_lamps(const std::vector<AdjustmentCapture>& captures) {
+  std::map<int, int> counts;
+  for (const AdjustmentCapture& capture : captures) {
+    for (const Detection& detection : capture.detections) ++counts[detection.lamp];
   }
-  double height_m = rms_radius(lamps_m) / rms_radius(z);
-  const auto above_m = [&](std::size_t i) {
-    return rays[i].lamp->position_m.z() - mean_z_m + height_m;
-  };
-  Similarity pose{{0, 0}, {1, 0}};
-  constexpr int iterations = 3;
-  constexpr double max_factor = 1.25;  // beyond it the fit is meaningless
-  for (int iteration = 0; iteration < iterations; ++iteration) {
-    const auto fit = fit_similarity_transform(
-        z.size(), [&](std::size_t i) -> Eigen::Vector2d { return above_m(i) * z[i]; },
-        [&](std::size_t i) { return lamps_m[i]; });
-    if (!fit) break;
-    const double factor = fit->factor.norm();
-    pose = {fit->offset, fit->factor / factor};
-    if (std::max(factor, 1 / factor) > max_factor) break;
-    height_m *= factor;
+  return counts;
+}
+
+/// Removes detections that do not connect a lamp to other lamps.
+void remove_unconnected_detections(std::vector<AdjustmentCapture>& captures) {
+  constexpr std::size_t min_lamps = 3;
+  constexpr int min_captures = 2;
+  for (std::size_t removed = 1; removed > 0;) {
+    std::erase_if(captures, [](const auto& one) { return one.detections.size() < min_lamps; });
+    std::map<int, int> counts = count_captures_of_lamps(captures);
+    removed = 0;
+    for (AdjustmentCapture& capture : captures) {
+      removed += std::erase_if(capture.detections, [&](const Detection& detection) {
+        return counts[detection.lamp] < min_captures;
+      });
+    }
   }
-  CeilingView view{pose.offset, {}, std::atan2(pose.factor.y(), pose.factor.x())};
-  for (std::size_t i = 0; i < rays.size(); ++i) {
-    if (!(above_m(i) > 0) || !std::isfinite(height_m)) return std::nullopt;
-    view.lamps.push_back({rays[i].lamp->id,
-                          pose.offset + complex_product(pose.factor, above_m(i) * z[i]),
-                          above_m(i)});
-  }
-  return view;
 }
 
 /// Captures of a stationary camera.
@@ -120,59 +110,146 @@ struct MapCaptures {
   std::span<const Frame> frames;
   const Calibration& calibration;
   const MapErrorOptions& options;
-  const Lens lens{calibration.camera.lens_model, calibration.camera.intrinsics};
-  /// Projects the captures with three lamps or more.
-  std::vector<CeilingView> make_ceiling_views(const LampMap& map,
-                                              const Eigen::Matrix3d& base_from_camera,
-                                              const LampPositions& positions_m) const {
-    constexpr std::size_t min_lamps = 3;
-    std::vector<CeilingView> views;
-    const auto& inclinations = options.inclinations;
+
+  /// Returns captures with the lamps of the map. Omits lamps that are detected twice, and the noise
+  /// of the detections.
+  std::vector<AdjustmentCapture> make_captures(const LampMap& map) const {
+    std::vector<AdjustmentCapture> captures;
     const std::size_t stride = 1 + (frames.size() - 1) / options.max_captures;
     for (std::size_t i = 0; i < frames.size(); i += stride) {
-      const bool is_inclined = !inclinations.empty() && inclinations[i];
-      const Eigen::Matrix3d level_from_base = compute_level_from_base(
-          is_inclined ? *inclinations[i] : Inclination{0, 0}, options.yaw_in_robot_rad);
-      const auto rays =
-          compute_level_rays(frames[i], map, lens, level_from_base * base_from_camera);
-      if (rays.size() < min_lamps) continue;
-      if (auto view = project_rays_to_ceiling(rays, positions_m)) views.push_back(std::move(*view));
+      std::map<int, int> counts;
+      for (const Detection& detection : frames[i].detections) ++counts[detection.lamp];
+      AdjustmentCapture capture{frames[i].image, {}};
+      for (const Detection& detection : frames[i].detections) {
+        if (counts[detection.lamp] == 1 && find_lamp_by_id(map.lamps, detection.lamp) != nullptr)
+          capture.detections.push_back({detection.lamp, detection.pixel, {}});
+      }
+      if (!options.inclinations.empty() && options.inclinations[i]) {
+        const Eigen::Matrix3d level_from_base =
+            compute_level_from_base(*options.inclinations[i], options.yaw_in_robot_rad);
+        const Eigen::Vector3d up = level_from_base.row(2);
+        capture.inclination = Inclination{std::atan2(up.y(), up.z()), -std::asin(up.x())};
+      }
+      captures.push_back(std::move(capture));
     }
-    return views;
+    return captures;
   }
 
-  /// Estimates the displacements. Iterates, because the equations are linearized at the pose of
-  /// each capture with respect to the tilt and to differences of height.
+  /// Estimates the displacements by an adjustment with exact lens and heights. Captures do not
+  /// determine similarities of the floor plan (MapPrior::heights).
+  ///
+  /// Uses lamps that at least two captures contain together with at least two other lamps. Returns
+  /// std::nullopt if captures do not tie all these lamps together or if there is no redundancy.
   std::optional<LampDisplacements> estimate_displacements(const LampMap& map) const {
-    constexpr int max_iterations = 8;
-    constexpr double tolerance_m = 1e-6;
-    const bool tilt_is_free = !calibration.rotation_center;
-    Eigen::Matrix3d base_from_camera =
-        tilt_is_free ? Eigen::Matrix3d::Identity()
-                     : compute_level_from_camera_matrix(calibration, Correction::all);
-    LampPositions positions_m;
-    for (const Lamp& lamp : map.lamps) positions_m[lamp.id] = lamp.position_m.head<2>();
-    std::optional<LampDisplacements> found;
-    for (int iteration = 0; iteration < max_iterations; ++iteration) {
-      found = estimate_lamp_displacements(
-          map, make_ceiling_views(map, base_from_camera, positions_m), tilt_is_free);
-      if (!found) return std::nullopt;
-      double change_m = found->tilt.norm() * rms_radius(found->map_m);
-      const std::vector<Eigen::Vector2d> displaced_m = compute_displaced_positions(*found);
-      for (std::size_t i = 0; i < found->lamps.size(); ++i) {
-        Eigen::Vector2d& displaced_position_m = positions_m.at(found->lamps[i]);
-        change_m = std::max(change_m, (displaced_m[i] - displaced_position_m).norm());
-        displaced_position_m = displaced_m[i];
-      }
-      if (change_m < tolerance_m) break;
-      const Eigen::Vector3d up(-found->tilt.x(), -found->tilt.y(), 1);
-      const Eigen::Vector3d zenith = base_from_camera.transpose() * up.normalized();
-      if (!(zenith.z() > 0)) return std::nullopt;
-      if (tilt_is_free) base_from_camera = level_rotation_from_zenith(zenith);
+    constexpr double no_limit = std::numeric_limits<double>::infinity();
+    AdjustmentInput input{make_captures(map), map, {}};
+    for (Lamp& lamp : input.lamps.lamps) lamp.sd_m.reset();
+    input.calibration.camera = calibration.camera;
+    input.map_prior = MapPrior::heights;
+    input.zenith_is_exact = calibration.rotation_center.has_value();
+    if (input.zenith_is_exact) {
+      input.calibration.rotation_center = calibration.rotation_center;
+      input.calibration.rotation_center->zenith_in_camera =
+          compute_level_from_camera_matrix(calibration, Correction::all).row(2);
     }
+    LampDisplacements found;
+    AdjustmentResult adjusted;
+    remove_unconnected_detections(input.captures);
+    const std::size_t detections = count_detections(input.captures);
+    // Rejected detections may leave others unconnected.
+    for (std::size_t used = 0; count_detections(input.captures) != used;) {
+      adjusted = run_bundle_adjustment(input, {no_limit, no_limit});
+      constexpr double max_residual_fraction = 0.01;  // of the focal length; lenses are better
+      if (!adjusted.has_succeeded() ||
+          adjusted.residual_px > max_residual_fraction * calibration.camera.focal_px().mean()) {
+        found.inlier_fraction = 0;
+        return found;
+      }
+      used = static_cast<std::size_t>(adjusted.detections);
+      std::vector<std::vector<Detection>> inliers(input.captures.size());
+      for (const auto& [capture, lamp, distance_px, is_used] : adjusted.residuals) {
+        const auto& all = input.captures[capture].detections;
+        if (is_used) inliers[capture].push_back(*std::ranges::find(all, lamp, &Detection::lamp));
+        if (!is_used) found.outliers_px[lamp].push_back(distance_px);
+      }
+      for (std::size_t i = 0; i < inliers.size(); ++i)
+        input.captures[i].detections = std::move(inliers[i]);
+      remove_unconnected_detections(input.captures);
+    }
+    constexpr double min_degrees_of_freedom = 0.5;
+    if (input.captures.empty() || !(adjusted.degrees_of_freedom > min_degrees_of_freedom))
+      return std::nullopt;
+    found.height_m = adjusted.lamp_height_m;
+    found.inlier_fraction =
+        static_cast<double>(count_detections(input.captures)) / static_cast<double>(detections);
+    set_displacements(map, adjusted, count_captures_of_lamps(input.captures), found);
+    // Lamps without a tie move independently, by the size of a guess.
+    if (!(found.covariance_m2.diagonal().maxCoeff() < std::pow(rms_radius(found.map_m), 2)))
+      return std::nullopt;
     return found;
   }
+
+ private:
+  static void set_displacements(const LampMap& map, const AdjustmentResult& adjusted,
+                                const std::map<int, int>& captures, LampDisplacements& found) {
+    const auto& ids = adjusted.covariance_lamp_ids;
+    const Eigen::Index size = 2 * std::ssize(captures);
+    found.displacement_m.resize(size);
+    std::vector<Eigen::Index> rows;
+    for (const auto& [lamp, count] : captures) {
+      const Eigen::Vector3d& map_m = find_lamp_by_id(map.lamps, lamp)->position_m;
+      const Eigen::Vector3d& found_m =
+          find_lamp_by_id(adjusted.refined_map.lamps, lamp)->position_m;
+      found.displacement_m.segment<2>(2 * std::ssize(found.lamps)) = (found_m - map_m).head<2>();
+      found.lamps.push_back(lamp);
+      found.captures.push_back(count);
+      found.map_m.emplace_back(map_m.head<2>());
+      const Eigen::Index row = adjusted.refined_covariance.rows() - 3 * std::ssize(ids) +
+                               3 * (std::ranges::find(ids, lamp) - ids.begin());
+      rows.insert(rows.end(), {row, row + 1});
+    }
+    const Eigen::MatrixXd basis = make_similarity_basis(found.map_m);
+    found.projector = Eigen::MatrixXd::Identity(size, size) - basis * basis.transpose();
+    found.displacement_m = (found.projector * found.displacement_m).eval();
+    found.covariance_m2 =
+        found.projector * adjusted.refined_covariance(rows, rows) * found.projector;
+  }
 };
+
+/// Returns the offset of a lamp after the similarity that maps the lamps without `excluded` to the
+/// map. Returns std::nullopt if there is no such similarity.
+std::optional<Eigen::Vector2d> compute_lamp_offset_relative_to_others(
+    const LampDisplacements& found, std::size_t lamp, const std::vector<std::size_t>& excluded) {
+  std::vector<Eigen::Vector2d> from_m, to_m;
+  for (std::size_t i = 0; i < found.lamps.size(); ++i) {
+    if (std::find(excluded.begin(), excluded.end(), i) != excluded.end()) continue;
+    from_m.push_back(found.displaced_lamp_position_m(i));
+    to_m.push_back(found.map_m[i]);
+  }
+  const auto to_map = fit_similarity_transform(
+      from_m.size(), [&](std::size_t i) { return from_m[i]; },
+      [&](std::size_t i) { return to_m[i]; });
+  if (!to_map) return std::nullopt;
+  return to_map->offset + complex_product(to_map->factor, found.displaced_lamp_position_m(lamp)) -
+         found.map_m[lamp];
+}
+
+/// Computes the offset of each lamp from the similarity that fits the other lamps best. Omits lamps
+/// whose offset the other lamps do not determine.
+std::vector<LampOffset> compute_lamp_offsets_relative_to_others(const LampDisplacements& found) {
+  constexpr double min_own_fraction = 1e-3;
+  std::vector<LampOffset> offsets;
+  for (std::size_t i = 0; i < found.lamps.size(); ++i) {
+    const auto row = 2 * static_cast<Eigen::Index>(i);
+    const double own_fraction = found.projector(row, row);
+    const auto offset_m = compute_lamp_offset_relative_to_others(found, i, {i});
+    if (own_fraction < min_own_fraction || !offset_m) continue;
+    const Eigen::Vector2d sd_m =
+        found.covariance_m2.diagonal().segment<2>(row).cwiseMax(0).cwiseSqrt() / own_fraction;
+    offsets.push_back({found.lamps[i], found.captures[i], found.map_m[i], *offset_m, sd_m});
+  }
+  return offsets;
+}
 
 /// Displacements as independent coordinates, and tests of the lamps that explain them.
 class DisplacementTest {
@@ -299,47 +376,63 @@ struct OtherMap {
   std::optional<LampDisplacements> found = {};
 
   double compute_room_size_m() const {
-    return found ? found->displacement_m.norm() : std::numeric_limits<double>::infinity();
+    return found && !found->lamps.empty() ? found->displacement_m.norm()
+                                          : std::numeric_limits<double>::infinity();
   }
 };
+
+OtherMap swap_lamps(const LampMap& map, int first, int second) {
+  OtherMap other{{MapErrorKind::swapped, {first, second}}, map};
+  for (Lamp& lamp : other.map.lamps) {
+    if (lamp.id == first) lamp.position_m = find_lamp_by_id(map.lamps, second)->position_m;
+    if (lamp.id == second) lamp.position_m = find_lamp_by_id(map.lamps, first)->position_m;
+  }
+  return other;
+}
 
 /// Returns the two maps with two lamps swapped that have the smallest residuals, best first. Omits
 /// maps whose residuals are no smaller than those of the original map.
 std::vector<OtherMap> make_swapped_maps(const LampDisplacements& found, const LampMap& map) {
-  Eigen::Matrix2Xd lamps_m(2, std::ssize(found.lamps));
-  for (Eigen::Index i = 0; i < lamps_m.cols(); ++i) {
-    lamps_m.col(i) = found.map_m[static_cast<std::size_t>(i)];
-  }
+  std::vector<Eigen::Vector2d> lamps_m = found.map_m;
+  Eigen::VectorXd displaced_m = found.displacement_m;
+  for (std::size_t i = 0; i < lamps_m.size(); ++i)
+    displaced_m.segment<2>(2 * static_cast<Eigen::Index>(i)) += lamps_m[i];
+  // Squared displacements from the lamps in their present order, after the best similarity.
   const auto squares_m2 = [&] {
-    return lamps_m.reshaped().dot(found.information * lamps_m.reshaped());
+    const Eigen::MatrixXd basis = make_similarity_basis(lamps_m);
+    return (displaced_m - basis * (basis.transpose() * displaced_m)).squaredNorm();
   };
-  const Eigen::Map<const Eigen::Matrix2Xd> moved_m(found.displacement_m.data(), 2, lamps_m.cols());
   const double unchanged_m2 = squares_m2();
-  std::vector<std::tuple<double, Eigen::Index, Eigen::Index>> pairs;
-  for (Eigen::Index i = 0; i < lamps_m.cols(); ++i) {
-    for (Eigen::Index k = 0; k < i; ++k) {
+  std::vector<std::tuple<double, std::size_t, std::size_t>> pairs;
+  for (std::size_t i = 0; i < lamps_m.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
       constexpr double min_fraction = 0.1;  // of lamps that are displaced by their distance
-      const double distance_m = (lamps_m.col(i) - lamps_m.col(k)).norm();
-      if (std::min(moved_m.col(i).norm(), moved_m.col(k).norm()) < min_fraction * distance_m) {
-        continue;
-      }
-      lamps_m.col(i).swap(lamps_m.col(k));
+      const double min_m = min_fraction * (lamps_m[i] - lamps_m[k]).norm();
+      const auto displacement_m = [&](std::size_t lamp) {
+        return found.displacement_m.segment<2>(2 * static_cast<Eigen::Index>(lamp)).norm();
+      };
+      if (std::min(displacement_m(i), displacement_m(k)) < min_m) continue;
+      std::swap(lamps_m[i], lamps_m[k]);
       if (squares_m2() < unchanged_m2) pairs.emplace_back(squares_m2(), k, i);
-      lamps_m.col(i).swap(lamps_m.col(k));
+      std::swap(lamps_m[i], lamps_m[k]);
     }
   }
   std::sort(pairs.begin(), pairs.end());
   std::vector<OtherMap> maps;
   for (const auto& [squares, k, i] : pairs) {
-    const int first = found.lamps[static_cast<std::size_t>(k)];
-    const int second = found.lamps[static_cast<std::size_t>(i)];
-    LampMap swapped = map;
-    for (Lamp& lamp : swapped.lamps) {
-      if (lamp.id == first) lamp.position_m = find_lamp_by_id(map.lamps, second)->position_m;
-      if (lamp.id == second) lamp.position_m = find_lamp_by_id(map.lamps, first)->position_m;
-    }
-    maps.push_back({{MapErrorKind::swapped, {first, second}}, std::move(swapped)});
+    maps.push_back(swap_lamps(map, found.lamps[k], found.lamps[i]));
     if (maps.size() == 2) break;
+  }
+  return maps;
+}
+
+/// Returns the maps with any two lamps swapped; none for many lamps.
+std::vector<OtherMap> make_all_swapped_maps(const LampMap& map) {
+  constexpr std::size_t max_lamps = 10;
+  std::vector<OtherMap> maps;
+  for (std::size_t i = 0; i < map.lamps.size() && map.lamps.size() <= max_lamps; ++i) {
+    for (std::size_t k = 0; k < i; ++k)
+      maps.push_back(swap_lamps(map, map.lamps[k].id, map.lamps[i].id));
   }
   return maps;
 }
@@ -369,22 +462,21 @@ bool explains_captures(const OtherMap& other) {
 /// map far better than the original map, and two swapped lamps better than any other pair.
 std::optional<MapError> find_swapped_lamps(const MapCaptures& captures, const LampMap& map,
                                            const std::optional<LampDisplacements>& found) {
-  std::vector<OtherMap> others;
-  if (found) others = make_swapped_maps(*found, map);
-  if (!is_map_contradicted(found) && others.empty()) return std::nullopt;
+  const bool is_contradicted = is_map_contradicted(found);
+  std::vector<OtherMap> others =
+      is_contradicted ? make_all_swapped_maps(map) : make_swapped_maps(*found, map);
+  if (!is_contradicted && others.empty()) return std::nullopt;
   LampMap mirrored = map;
   for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
   others.push_back({{MapErrorKind::mirrored}, std::move(mirrored)});
   for (OtherMap& other : others) other.found = captures.estimate_displacements(other.map);
-  if (is_map_contradicted(found)) {
-    const auto fits = std::ranges::find_if(others, explains_captures);
-    return fits == others.end() ? std::nullopt : std::optional(fits->error);
-  }
+  std::ranges::sort(others.begin(), others.end() - 1, {}, &OtherMap::compute_room_size_m);
   // The mirror image of a square equals a square with two corners swapped.
   const bool is_mirrored =
       others.back().compute_room_size_m() <= 2 * others.front().compute_room_size_m();
   const std::size_t best = is_mirrored ? others.size() - 1 : 0;
   if (!explains_captures(others[best])) return std::nullopt;
+  if (is_contradicted) return others[best].error;
   const DisplacementTest test(*others[best].found, map);
   const double added_m2 = test.compute_added_variance_m2({});
   const auto count = static_cast<double>(map.lamps.size());
@@ -426,24 +518,26 @@ std::vector<MapError> find_moved_lamps(const LampDisplacements& found,
 }
 
 /// Finds the lamp with most of the outliers: at least two, in more than 10 % of its captures. Their
-/// median has to exceed `min_outlier_m` and three standard deviations of the lamp's survey.
+/// median has to exceed `min_outlier_px` and three standard deviations of the lamp's survey.
 std::optional<MapError> find_lamp_at_varying_position(const LampDisplacements& found,
-                                                      const LampMap& map, double min_outlier_m) {
+                                                      const LampMap& map, double min_outlier_px,
+                                                      double focal_px) {
   constexpr std::size_t min_outliers = 2;
   constexpr double min_fraction = 0.1, max_survey_sigmas = 3;
   std::size_t all = 0;
-  for (const auto& [lamp, outliers_m] : found.outliers_m) all += outliers_m.size();
-  for (const auto& [lamp, outliers_m] : found.outliers_m) {
-    const std::size_t count = outliers_m.size();
+  for (const auto& [lamp, outliers_px] : found.outliers_px) all += outliers_px.size();
+  for (const auto& [lamp, outliers_px] : found.outliers_px) {
+    const std::size_t count = outliers_px.size();
     const auto at = std::find(found.lamps.begin(), found.lamps.end(), lamp);
     const auto others = at == found.lamps.end()
                             ? 0
                             : found.captures[static_cast<std::size_t>(at - found.lamps.begin())];
     const std::size_t captures = count + static_cast<std::size_t>(others);
-    const double survey_m = max_survey_sigmas * find_lamp_by_id(map.lamps, lamp)->sd_m.value_or(0);
+    const double survey_px = max_survey_sigmas * focal_px / found.height_m *
+                             find_lamp_by_id(map.lamps, lamp)->sd_m.value_or(0);
     if (count < min_outliers || 2 * count <= all ||
         static_cast<double>(count) <= min_fraction * static_cast<double>(captures) ||
-        upper_median(outliers_m) < std::max(min_outlier_m, survey_m)) {
+        upper_median(outliers_px) < std::max(min_outlier_px, survey_px)) {
       continue;
     }
     MapError error{MapErrorKind::inconsistent, {lamp}};
@@ -541,12 +635,13 @@ MapErrors detect_misplaced_or_swapped_lamps(std::span<const Frame> frames, const
   }
   const DisplacementTest test(*found, map);
   result.errors = find_moved_lamps(*found, test);
-  const double min_offset_m =
-      options.min_offset_px * found->height_m / calibration.camera.focal_px().mean();
+  const double focal_px = calibration.camera.focal_px().mean();
+  const double min_offset_m = options.min_offset_px * found->height_m / focal_px;
   std::erase_if(result.errors,
                 [&](const MapError& error) { return error.offset_m.norm() < min_offset_m; });
   constexpr double min_outlier_ratio = 5;
-  auto unsteady = find_lamp_at_varying_position(*found, map, min_outlier_ratio * min_offset_m);
+  auto unsteady = find_lamp_at_varying_position(
+      *found, map, min_outlier_ratio * options.min_offset_px, focal_px);
   const bool is_named = unsteady && std::ranges::any_of(result.errors, [&](const MapError& error) {
                           return error.lamps == unsteady->lamps;
                         });

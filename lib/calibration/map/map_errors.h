@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "calibration/map/lamp_displacements.h"
 #include "captures/detections_table.h"
 #include "geometry/frames.h"
 #include "rig/calibration.h"
@@ -52,6 +51,15 @@ std::string describe_lamps_moved_since_calibration(int lamps);
 /// Describes all errors in one line.
 std::string describe_map_errors(std::span<const MapError> errors);
 
+/// Displacement of one lamp: its position according to the other lamps minus its position in the
+/// map, horizontal, in the world. If a single lamp moved by d, its displacement is d.
+struct LampOffset {
+  int lamp;
+  /// Number of captures that contribute to the displacement.
+  int captures;
+  Eigen::Vector2d map_m, offset_m, sd_m;
+};
+
 /// Result of detect_misplaced_or_swapped_lamps().
 struct MapErrors {
   std::vector<MapError> errors;
@@ -80,7 +88,9 @@ struct MapErrorOptions {
 /// @param calibration  without a rotation center, the tilt of the camera is also estimated
 /// @return             no errors if too few captures tie the lamps together
 ///
-/// Tests the displacements x of estimate_lamp_displacements():
+/// Tests the displacements x of the lamps in an adjustment with exact lens and heights
+/// (run_bundle_adjustment(), MapPrior::heights), of lamps that two captures contain with two
+/// others:
 ///   x = P (d + m) + e
 ///   P  projector onto the displacements that are no similarity of the map
 ///   d  offsets of k lamps
@@ -102,6 +112,9 @@ struct MapErrorOptions {
 /// Two lamps are reported as swapped, or the map as mirrored, if such a map reduces chi^2 by the
 /// bound. The bound is that with k = 0 and N = all pairs. For two lamps it also has to be smaller
 /// than for any other pair.
+///
+/// If the captures contradict the map, the adjustment of the swapped or mirrored map has to explain
+/// them; swapped lamps are then found in maps of up to ten lamps.
 ///
 /// Limits:
 ///   - Only horizontal errors are estimated.

@@ -4,30 +4,24 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cassert>
 #include <cmath>
-#include <cstdint>
-#include <optional>
-#include <utility>
 
-#include "calibration/rotation/rotation_fit.h"
-#include "geometry/median.h"
-#include "geometry/robust_scatter.h"
 #include "geometry/symmetric.h"
 
 namespace vlp {
 namespace {
 
-/// Observations of one lamp at one height, in units of the focal length.
+/// Inliers among the observations of one lamp at one height, in units of the focal length.
 struct Trace {
   std::vector<std::size_t> observations;
   std::vector<Eigen::Vector2d> points;
 };
 
-Trace collect_lamp_trace(const RotationCaptures& rotation, std::size_t lamp, std::size_t height) {
+Trace collect_lamp_trace(const RotationCaptures& rotation, const RotationFit& axis,
+                         std::size_t lamp, std::size_t height) {
   Trace trace;
-  for (std::size_t i = 0; i < rotation.observations.size(); ++i) {
+  for (const std::size_t i : axis.used_observations) {
     const RotationObservation& observation = rotation.observations[i];
     if (observation.lamp != lamp || rotation.captures[observation.capture].height != height)
       continue;
@@ -36,114 +30,6 @@ Trace collect_lamp_trace(const RotationCaptures& rotation, std::size_t lamp, std
     trace.points.emplace_back(observation.ray.hnormalized());
   }
   return trace;
-}
-
-std::vector<double> compute_distances(const Circle& circle,
-                                      const std::vector<Eigen::Vector2d>& points) {
-  std::vector<double> off;
-  off.reserve(points.size());
-  for (const Eigen::Vector2d& point : points) {
-    off.push_back(std::abs((point - circle.center).norm() - circle.radius));
-  }
-  return off;
-}
-
-/// Returns the circle through three of the points that has the smallest median distance to all
-/// points (least median of squares, Rousseeuw 1984). Tries a fixed sequence of triples.
-std::optional<Circle> fit_median_circle(const std::vector<Eigen::Vector2d>& points) {
-  constexpr int triples = 200;
-  std::optional<Circle> best;
-  double min_median = 0;
-  std::uint32_t state = 1;
-  const auto next = [&] {
-    state = state * 1664525 + 1013904223;
-    return points[(state >> 8) % points.size()];
-  };
-  for (int i = 0; i < triples; ++i) {
-    const std::array<Eigen::Vector2d, 3> triple{next(), next(), next()};
-    const auto fit = fit_circle(triple);
-    if (!fit) continue;
-    const double median = upper_median(compute_distances(fit->circle, points));
-    if (!best || median < min_median) best = fit->circle, min_median = median;
-  }
-  return best;
-}
-
-constexpr double kOutlierSigmas = 4.5;
-/// Fewer points have too little redundancy to find an outlier.
-constexpr std::size_t kMinPointsToTest = 8;
-
-/// Moves a point of the trace to `outliers`.
-void reject(Trace& trace, std::size_t point, double distance_px,
-            std::vector<RotationOutlier>& outliers) {
-  outliers.push_back({trace.observations[point], distance_px});
-  trace.observations.erase(trace.observations.begin() + static_cast<std::ptrdiff_t>(point));
-  trace.points.erase(trace.points.begin() + static_cast<std::ptrdiff_t>(point));
-}
-
-/// Rejects points far from the circle on which most points agree.
-void reject_gross_outliers(Trace& trace, double focal_px, std::vector<RotationOutlier>& outliers) {
-  constexpr double rounding = 1e-9;
-  auto circle = fit_median_circle(trace.points);
-  const double freedom = static_cast<double>(trace.points.size()) - 3;
-  std::vector<double> off;
-  double limit = 0;
-  for (int iteration = 0; circle && iteration < 4; ++iteration) {
-    off = compute_distances(*circle, trace.points);
-    std::vector<double> squares;
-    squares.reserve(off.size());
-    for (const double one : off) squares.push_back(one * one);
-    const double variance =
-        std::max(estimate_robust_variance_1d(std::move(squares), freedom), rounding * rounding);
-    limit = std::sqrt(compute_squared_outlier_bound_1d(kOutlierSigmas, freedom) * variance);
-    std::vector<Eigen::Vector2d> near;
-    near.reserve(off.size());
-    for (std::size_t i = 0; i < off.size(); ++i) {
-      if (off[i] <= limit) near.push_back(trace.points[i]);
-    }
-    const auto better = fit_circle(near);
-    if (!better) break;
-    circle = better->circle;
-  }
-  for (std::size_t i = off.size(); i-- > 0;) {
-    if (off[i] > limit) reject(trace, i, off[i] * focal_px, outliers);
-  }
-}
-
-/// Rejects the point that is farthest from the circle if the circle through the other points
-/// contradicts it (Student's t of the deleted residual). Returns true if a point was rejected.
-bool reject_worst_point_of_trace(Trace& trace, const Circle& circle, double focal_px,
-                                 std::vector<RotationOutlier>& outliers) {
-  constexpr double rounding = 1e-9;
-  const std::vector<double> off = compute_distances(circle, trace.points);
-  const auto worst =
-      static_cast<std::size_t>(std::max_element(off.begin(), off.end()) - off.begin());
-  std::vector<Eigen::Vector2d> others = trace.points;
-  others.erase(others.begin() + static_cast<std::ptrdiff_t>(worst));
-  const auto fit = fit_circle(others);
-  if (!fit) return false;
-  const double count = static_cast<double>(others.size()), freedom = count - 3;
-  // The variance of the circle at the point is 3 / n of that of a point, on average.
-  const double variance =
-      std::max(fit->rms * fit->rms * count / freedom, rounding * rounding) * (1 + 3 / count);
-  const double distance = compute_distances(fit->circle, {trace.points[worst]}).front();
-  if (distance * distance <= compute_squared_student_t_bound(kOutlierSigmas, freedom) * variance)
-    return false;
-  reject(trace, worst, distance * focal_px, outliers);
-  return true;
-}
-
-/// Fits a circle without outliers and moves them from `trace` to `outliers`. Returns std::nullopt
-/// if the points do not determine a circle.
-std::optional<CircleFit> fit_trimmed_circle(Trace& trace, double focal_px,
-                                            std::vector<RotationOutlier>& outliers) {
-  if (trace.points.size() >= kMinPointsToTest) reject_gross_outliers(trace, focal_px, outliers);
-  auto fit = fit_circle(trace.points);
-  while (fit && trace.points.size() >= kMinPointsToTest &&
-         reject_worst_point_of_trace(trace, fit->circle, focal_px, outliers)) {
-    fit = fit_circle(trace.points);
-  }
-  return fit;
 }
 
 /// Returns true if the yaws of the points, and not only their noise, determine the center of a
@@ -178,91 +64,56 @@ bool is_circle_center_determined(const Circle& circle, const std::vector<Eigen::
   return true;
 }
 
-/// Circles of all lamps at one height.
+/// Circles of one height.
 struct HeightCircles {
+  /// Circles whose centers are determined, and their observations.
   std::vector<LampCircle> circles;
-  /// Observations of each circle, without outliers.
-  std::vector<Trace> traces;
-  std::vector<RotationOutlier> outliers;
-  /// Number of lamps with three observations or more and no circle.
-  int without_circle = 0;
+  std::vector<std::size_t> observations;
+  /// Number of other lamps with three observations or more.
+  int undetermined = 0;
   /// Sum of the squared distances from the circles, and its degrees of freedom.
   double squares = 0, freedom = 0;
 };
 
-HeightCircles fit_circles(const RotationCaptures& rotation, std::size_t height, double focal_px) {
+HeightCircles fit_circles(const RotationCaptures& rotation, const RotationFit& axis,
+                          std::size_t height, double noise) {
   HeightCircles result;
   for (std::size_t lamp = 0; lamp < rotation.lamps.size(); ++lamp) {
-    Trace trace = collect_lamp_trace(rotation, lamp, height);
-    const auto fit = fit_trimmed_circle(trace, focal_px, result.outliers);
+    const Trace trace = collect_lamp_trace(rotation, axis, lamp, height);
     if (trace.points.size() < 3) continue;
-    if (!fit || !fit->converged) {
-      ++result.without_circle;
+    const auto fit = fit_circle(trace.points);
+    if (!fit || !fit->converged || !is_circle_center_determined(fit->circle, trace.points, noise)) {
+      ++result.undetermined;
       continue;
     }
     const double count = static_cast<double>(trace.points.size());
     result.circles.push_back({lamp, height, *fit});
-    result.traces.push_back(std::move(trace));
+    result.observations.insert(result.observations.end(), trace.observations.begin(),
+                               trace.observations.end());
     result.squares += fit->rms * fit->rms * count;
     result.freedom += count - 3;
   }
   return result;
 }
 
-/// Estimates the noise of a coordinate in units of the focal length. Uses the circles, or the
-/// axis if all circles have three points. Returns at least the given noise, and std::nullopt if
-/// neither residuals nor detections determine it.
-std::optional<double> estimate_noise(const std::vector<HeightCircles>& heights,
-                                     const RotationCaptures& rotation, const Camera& camera) {
-  const double focal_px = camera.focal_px().x();
-  double squares = 0, freedom = 0;
-  for (const HeightCircles& height : heights) {
-    squares += height.squares;
-    freedom += height.freedom;
-  }
-  std::optional<double> noise;
-  if (freedom > 0) {
-    noise = std::sqrt(squares / freedom);
-  } else if (const RotationFit axis = fit_rotation_axis(rotation, camera); axis.converged) {
-    noise = axis.residual_px / focal_px;
-  }
-  if (rotation.median_sigma_px)
-    noise = std::max(noise.value_or(0), *rotation.median_sigma_px / focal_px);
-  return noise;
-}
-
 }  // namespace
 
 CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotation,
-                                                  const Camera& camera) {
+                                                  const Camera& camera, const RotationFit& axis) {
   assert(rotation.status == RotationStatus::ok);
   CircleCenters result;
+  if (!axis.converged) return result;
+  result.mean.outliers = axis.outliers;
   const double focal_px = camera.focal_px().x();
-  std::vector<HeightCircles> heights;
-  for (std::size_t height = 0; height < rotation.heights.size(); ++height) {
-    heights.push_back(fit_circles(rotation, height, focal_px));
-  }
-  const std::optional<double> noise = estimate_noise(heights, rotation, camera);
+  const double noise = std::max(axis.residual_px, rotation.median_sigma_px.value_or(0)) / focal_px;
   double squares = 0, freedom = 0;
-  for (const HeightCircles& height : heights) {
-    std::vector<LampCircle> determined;
-    std::vector<std::size_t> observations;
-    for (std::size_t i = 0; i < height.circles.size() && noise; ++i) {
-      const LampCircle& circle = height.circles[i];
-      const Trace& trace = height.traces[i];
-      if (!is_circle_center_determined(circle.fit.circle, trace.points, *noise)) continue;
-      determined.push_back(circle);
-      observations.insert(observations.end(), trace.observations.begin(), trace.observations.end());
-    }
-    const int undetermined =
-        height.without_circle + static_cast<int>(height.circles.size() - determined.size());
-    result.undetermined += undetermined;
-    if (std::ssize(determined) <= undetermined) continue;
-    result.mean.used_observations.insert(result.mean.used_observations.end(), observations.begin(),
-                                         observations.end());
-    result.circles.insert(result.circles.end(), determined.begin(), determined.end());
-    result.mean.outliers.insert(result.mean.outliers.end(), height.outliers.begin(),
-                                height.outliers.end());
+  for (std::size_t i = 0; i < rotation.heights.size(); ++i) {
+    const HeightCircles height = fit_circles(rotation, axis, i, noise);
+    result.undetermined += height.undetermined;
+    if (std::ssize(height.circles) <= height.undetermined) continue;
+    result.mean.used_observations.insert(result.mean.used_observations.end(),
+                                         height.observations.begin(), height.observations.end());
+    result.circles.insert(result.circles.end(), height.circles.begin(), height.circles.end());
     squares += height.squares;
     freedom += height.freedom;
   }

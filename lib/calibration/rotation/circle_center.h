@@ -37,16 +37,16 @@ struct CircleCenters {
 /// Fits a circle to the points of each lamp in the undistorted image and averages the circle
 /// centers.
 ///
-/// @return  the mean center with model RotationModel::shift; not converged if no height is used
+/// @return  the mean center with model RotationModel::shift; not converged if no height is used, or
+///     if the axis fit has not converged
 ///
 /// The result is biased if the camera is tilted. For a tilt t and a lamp at angle phi from the
 /// axis, the center of the lamp's trace is at
 ///   f sin t cos t / (cos^2 t - sin^2 phi)
 /// instead of f tan t. The circles then disagree, and their mean is biased outwards.
 ///
-/// Outliers are rejected on circles with eight points or more, at 4.5 standard deviations. The
-/// first test compares the distances with their median. The second test compares each point with
-/// the circle through the other points, with Student's t (robust_scatter.h).
+/// @param axis  fit of fit_rotation_axis(), whose outliers are rejected and whose residuals are the
+///     noise, which is at least the given one
 ///
 /// A circle needs three observations of a lamp at one height that determine the center rather than
 /// their noise. Observations at two opposite yaws do not determine it. A height is used only if
@@ -54,6 +54,6 @@ struct CircleCenters {
 ///
 /// Source: Chen and Guan, section 3.1, eq. 9.
 CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotation,
-                                                  const Camera& camera);
+                                                  const Camera& camera, const RotationFit& axis);
 
 }  // namespace vlp

@@ -29,6 +29,9 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
+/// Mean height of the lamps above the captures of DetectLampErrorsAtLimits.
+constexpr double kMeanHeight_m = 1.45;
+
 MapError make_moved_lamp(int lamp, const Eigen::Vector3d& offset_mm) {
   return {MapErrorKind::moved, {lamp}, 1e-3 * offset_mm};
 }
@@ -412,10 +415,10 @@ TEST_F(DetectLampErrorsAtLimits, ReportsNoMovedLampsIfMoreThanEightMoved) {
   }
 }
 
-/// The smallest offset is given in pixels at the height of the first lamp in the first capture.
+/// The smallest offset is given in pixels at the mean height of the lamps above the camera.
 TEST_F(DetectLampErrorsAtLimits, OmitsOffsetsBelowSmallestOffsetInPixels) {
   place(1).head<2>() += Eigen::Vector2d(0.012, -0.016);
-  const double offset_px = 0.02 * 521 / 1.6;
+  const double offset_px = 0.02 * 521 / kMeanHeight_m;
   options.min_offset_px = 0.98 * offset_px;
   EXPECT_THAT(detect().errors, SizeIs(1));
   options.min_offset_px = 1.02 * offset_px;
@@ -496,10 +499,8 @@ TEST_F(DetectUnsteadyLamp, IsReportedIfOutliersExceedSurveyErrorsAndSmallestOffs
   const double median_px = 5 * find_limit(40, [&](double px) { options.min_offset_px = px; });
   options.min_offset_px = 0.25;
   const double median_m = 3 * find_limit(0.2, [&](double sd_m) { map.lamps[3].sd_m = sd_m; });
-  // 60 px without the part that the poses take.
-  EXPECT_GT(median_px, 30);
-  EXPECT_LT(median_px, 60);
-  EXPECT_NEAR(median_m / (median_px / 521 * 1.6), 1, 0.01);
+  EXPECT_NEAR(median_px, 60, 1);
+  EXPECT_NEAR(median_m / (median_px / 521 * kMeanHeight_m), 1, 0.01);
 }
 
 /// Two lamps at a distance for which chi-squared of the map with both swapped is near its bound.

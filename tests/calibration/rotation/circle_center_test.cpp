@@ -31,6 +31,10 @@ RotationCaptures find_captures(const RotationScene& scene) {
   return rotation;
 }
 
+CircleCenters find_centers(const RotationCaptures& rotation, const Camera& camera) {
+  return fit_and_average_lamp_circle_centers(rotation, camera, fit_rotation_axis(rotation, camera));
+}
+
 /// Returns the image point zeta - e/H of the axis of a level camera.
 Eigen::Vector2d center_of_level_camera(const RotationScene& scene) {
   const auto& f = scene.camera.intrinsics;
@@ -41,8 +45,7 @@ Eigen::Vector2d center_of_level_camera(const RotationScene& scene) {
 TEST(FitAndAverageLampCircleCenters, ReturnsAxisPixelWhenCameraIsLevel) {
   RotationScene scene;
   scene.lever_arm_m = {0.05, -0.02};
-  const CircleCenters found =
-      fit_and_average_lamp_circle_centers(find_captures(scene), scene.camera);
+  const CircleCenters found = find_centers(find_captures(scene), scene.camera);
   ASSERT_TRUE(found.mean.converged);
   EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   EXPECT_LT(found.spread_px, 1e-6);
@@ -64,7 +67,7 @@ TEST(FitAndAverageLampCircleCenters, CircleCentersMatchEllipseFormulaForTiltedCa
     scene.arc_rad = 2 * M_PI * (72 - 0.7) / 72;
     scene.only_in_image = false;
     const RotationCaptures rotation = find_captures(scene);
-    const CircleCenters found = fit_and_average_lamp_circle_centers(rotation, scene.camera);
+    const CircleCenters found = find_centers(rotation, scene.camera);
     ASSERT_EQ(found.circles.size(), scene.map.lamps.size());
     const double t = scene.tilt_rad;
     for (const auto& [lamp, height, fit] : found.circles) {
@@ -85,7 +88,7 @@ TEST(FitAndAverageLampCircleCenters, RejectsOneDisplacedDetectionAsOutlier) {
   const RotationCaptures rotation =
       find_in_place_rotation_captures(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
-  const CircleCenters found = fit_and_average_lamp_circle_centers(rotation, scene.camera);
+  const CircleCenters found = find_centers(rotation, scene.camera);
   EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
   ASSERT_EQ(found.mean.outliers.size(), 1U);
   const RotationObservation& outlier = rotation.observations[found.mean.outliers[0].observation];
@@ -136,8 +139,7 @@ TEST(FitAndAverageLampCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
         for (int k = 0; k < count; ++k) yaws_rad.push_back(yaw_rad + k % 2 * M_PI);
         const RotationCaptures rotation = captures_at(yaws_rad, noise_is_stated, random);
         ASSERT_EQ(rotation.status, RotationStatus::ok);
-        const CircleCenters found =
-            fit_and_average_lamp_circle_centers(rotation, RotationScene().camera);
+        const CircleCenters found = find_centers(rotation, RotationScene().camera);
         EXPECT_FALSE(found.mean.converged) << count << " captures, draw " << i;
         EXPECT_GT(found.undetermined, 0);
       }
@@ -157,8 +159,7 @@ TEST(FitAndAverageLampCircleCenters, DoesNotConvergeAtTwoOppositeYawsWhenTilted)
     const RotationCaptures rotation = find_in_place_rotation_captures(
         frames_at(scene, yaws_rad, 0, random), scene.map, scene.camera);
     ASSERT_EQ(rotation.status, RotationStatus::ok);
-    EXPECT_FALSE(fit_and_average_lamp_circle_centers(rotation, scene.camera).mean.converged)
-        << "draw " << i;
+    EXPECT_FALSE(find_centers(rotation, scene.camera).mean.converged) << "draw " << i;
   }
 }
 
@@ -184,8 +185,8 @@ TEST(FitAndAverageLampCircleCenters, IgnoresHeightWithTwoOppositeYaws) {
     ASSERT_EQ(spot_below.status, RotationStatus::ok);
     ASSERT_EQ(spot_both.status, RotationStatus::ok);
     ASSERT_EQ(spot_both.heights.size(), 2U);
-    const CircleCenters expected = fit_and_average_lamp_circle_centers(spot_below, scene.camera);
-    const CircleCenters found = fit_and_average_lamp_circle_centers(spot_both, scene.camera);
+    const CircleCenters expected = find_centers(spot_below, scene.camera);
+    const CircleCenters found = find_centers(spot_both, scene.camera);
     ASSERT_TRUE(expected.mean.converged);
     ASSERT_TRUE(found.mean.converged);
     EXPECT_THAT(found.mean.center.center_px, IsNear(expected.mean.center.center_px, 1e-9));
@@ -206,8 +207,7 @@ TEST(FitAndAverageLampCircleCenters, ConvergesWhenThirdYawJoinsOppositeYaws) {
         {yaw_rad, yaw_rad + M_PI, yaw_rad, yaw_rad + M_PI, yaw_rad + M_PI / 2, yaw_rad + M_PI / 2},
         true, random);
     ASSERT_EQ(rotation.status, RotationStatus::ok);
-    const CircleCenters found =
-        fit_and_average_lamp_circle_centers(rotation, RotationScene().camera);
+    const CircleCenters found = find_centers(rotation, RotationScene().camera);
     ASSERT_TRUE(found.mean.converged);
     ASSERT_TRUE(found.mean.covariance);
     EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(RotationScene()), 2));

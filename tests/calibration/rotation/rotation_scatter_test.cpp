@@ -23,7 +23,8 @@ constexpr int kDraws = 300;
 constexpr double kNoise_px = 0.3;
 
 RotationFit mean_circle(const RotationCaptures& rotation, const Camera& camera) {
-  return fit_and_average_lamp_circle_centers(rotation, camera).mean;
+  return fit_and_average_lamp_circle_centers(rotation, camera, fit_rotation_axis(rotation, camera))
+      .mean;
 }
 
 using Method = RotationFit (*)(const RotationCaptures&, const Camera&);
