@@ -48,7 +48,10 @@ def make_rotation(q):
 def interpolate_pose(body, image):
     """Returns rotation and position of the body at an image, linear between two poses."""
     times, first, rows = body
-    time = int(image.split(".")[0]) - first
+    stamp = image.split(".")[0]
+    if not stamp.isdigit():
+        sys.exit(f"{image}: its name is no time in ns; name images by their times, as the motion capture does")
+    time = int(stamp) - first
     after = int(np.searchsorted(times, time, side="right"))
     if not 0 < after < len(times):
         sys.exit(f"{image}: is not within the time of the motion capture")
@@ -92,6 +95,8 @@ def fit_mounting(fixes):
             weights = 1 / np.sqrt(1 + ((at - position) / SCALE_M) ** 2)
             normal += jacobian.T @ (weights[:, None] * jacobian)
             right -= jacobian.T @ (weights * (at - position))
+        if np.linalg.matrix_rank(normal) < len(normal):
+            sys.exit("the fixes do not determine the mounting: give three or more, with other rolls, pitches and yaws")
         step = np.linalg.solve(normal, right)
         half = np.r_[step[3:6] / 2, 1]  # rotation by minus the vector of the skew matrix above
         mounting = mounting[0] + step[:3], mounting[1] @ make_rotation(half), mounting[2] + step[6:]

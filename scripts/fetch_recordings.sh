@@ -5,7 +5,7 @@
 # Fetches public recordings of real cameras from their repositories on GitHub, at fixed commits, and checks
 # their digests. Existing folders are checked only.
 #
-#   scripts/fetch_recordings.sh [FOLDER]     default: out/recordings
+#   scripts/fetch_recordings.sh [FOLDER]     default: out/recordings; relative to the source folder
 #
 #   aprilgrid-mocap     30 images of a board by a hand-held camera under motion capture (images/, body.csv)
 #                       chutsu/yac, Chris Choi, MIT
@@ -18,6 +18,10 @@
 set -euo pipefail
 export LC_ALL=C  # order of names, on which digests depend
 cd "$(dirname "$0")/.."
+case ${1:-} in
+  -h | --help) sed -n '5,/^set/p' scripts/fetch_recordings.sh | sed '$d; s/^# \{0,1\}//'; exit ;;
+  -*) echo "fetch_recordings.sh: unknown option $1" >&2; exit 2 ;;
+esac
 folder=${1:-out/recordings}
 mkdir -p "$folder"
 scratch=$(mktemp --directory)

@@ -459,10 +459,10 @@ std::optional<KnownRadius> LightDetector::predict_radius(
   constexpr double max_ratio = 1.15;
   if (!inverse_height || lamps_.lamps.empty()) return std::nullopt;
   double min_radius = std::numeric_limits<double>::infinity(), max_radius = 0;
-  for (const Lamp& one : lamp ? std::span(lamp, 1) : std::span<const Lamp>(lamps_.lamps)) {
-    if (!one.shape.size_m || one.shape.kind != ShapeKind::disc) return std::nullopt;
+  for (const Lamp& candidate : lamp ? std::span(lamp, 1) : std::span<const Lamp>(lamps_.lamps)) {
+    if (!candidate.shape.size_m || candidate.shape.kind != ShapeKind::disc) return std::nullopt;
     const double radius = inverse_height->compute_radius_in_plane(
-        one.shape.size_m->x() / 2, compute_height_beyond_first_lamp_m(one));
+        candidate.shape.size_m->x() / 2, compute_height_beyond_first_lamp_m(candidate));
     if (!(radius > 0) || !std::isfinite(radius)) return std::nullopt;
     min_radius = std::min(min_radius, radius);
     max_radius = std::max(max_radius, radius);

@@ -101,9 +101,9 @@ class LightDetector {
   /// Returns the radii of discs of known size.
   std::vector<LampRadius> find_radii(const std::vector<ModulatedLight>& found,
                                      const OutlineFits& fits) const;
-  /// Returns the radius of a lamp in the level plane; without a lamp that of all lamps of the map.
-  /// Returns std::nullopt if it is no disc of known size, if the lamps differ by more than 15 %, or
-  /// if the height is unknown.
+  /// Returns the radius of a lamp in the level plane. Without a lamp, returns the common radius of
+  /// all lamps of the map. Returns std::nullopt if it is no disc of known size, if the lamps differ
+  /// by more than 15 %, or if the height is unknown.
   std::optional<KnownRadius> predict_radius(
       const Lamp* lamp, const std::optional<InverseHeight>& inverse_height) const;
   /// Returns the lamp with the period of a modulated light; nullptr if there is none or several.

@@ -58,9 +58,11 @@ Calibration remove_dispersion_from_calibration(Calibration calibration) {
   calibration.dispersion.reset();
   remove_history(calibration, "dispersion");
   if (auto& joint = calibration.covariance; joint && joint->find_row(kOffsetParameter)) {
-    Eigen::Index rows = std::ssize(joint->parameters) - 2;
+    const Eigen::Index offset_row = std::ssize(joint->parameters) - 2;
+    Eigen::Index rows = offset_row;
     // add_offset_to_covariance() appends lamps that are independent of all earlier parameters.
-    while (!joint->lamps.empty() && joint->matrix.block(rows - 3, 0, 3, rows - 3).isZero(0)) {
+    while (!joint->lamps.empty() && joint->matrix.block(rows - 3, 0, 3, rows - 3).isZero(0) &&
+           !joint->matrix.block(offset_row, rows - 3, 2, 3).isZero(0)) {
       joint->lamps.pop_back();
       rows -= 3;
     }

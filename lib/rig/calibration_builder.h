@@ -34,8 +34,8 @@ Calibration add_adjustment_to_calibration(Calibration calibration,
                                           Adjustment adjustment, JointCovariance covariance,
                                           HistoryEntry entry);
 
-/// Returns the calibration without dispersion, its history and its rows of the covariance. Removes
-/// the rows of lamps that are correlated with the dispersion only, too.
+/// Returns the calibration without dispersion, its history and its rows of the covariance. Also
+/// removes the rows of lamps that are correlated with the dispersion only.
 Calibration remove_dispersion_from_calibration(Calibration calibration);
 
 /// Returns the calibration with this dispersion and `entry` in its history.

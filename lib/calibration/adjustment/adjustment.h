@@ -217,7 +217,7 @@ MatrixX compute_intrinsics_covariance_from_pixel_sd(const Camera& camera, double
 
 /// Estimates lens, zenith, lever arm and lamp map from all captures.
 ///
-/// @pre every lamp has its sd_m; the calibration has no adjustment
+/// @pre with MapPrior::survey every lamp has its sd_m; the calibration has no adjustment
 ///
 /// The first solutions use a Cauchy loss on detections, lamps and positions, and identify the
 /// outliers. The final solution is plain least squares without outliers. A lamp counts as moved if

@@ -94,7 +94,9 @@ void remove_unconnected_detections(std::vector<AdjustmentCapture>& captures) {
   constexpr std::size_t min_lamps = 3;
   constexpr int min_captures = 2;
   for (std::size_t removed = 1; removed > 0;) {
-    std::erase_if(captures, [](const auto& one) { return one.detections.size() < min_lamps; });
+    std::erase_if(captures, [](const AdjustmentCapture& capture) {
+      return capture.detections.size() < min_lamps;
+    });
     std::map<int, int> counts = count_captures_of_lamps(captures);
     removed = 0;
     for (AdjustmentCapture& capture : captures) {
@@ -140,6 +142,7 @@ struct MapCaptures {
   ///
   /// Uses lamps that at least two captures contain together with at least two other lamps. Returns
   /// std::nullopt if captures do not tie all these lamps together or if there is no redundancy.
+  /// `inlier_fraction` is 0 and `lamps` is empty if the adjustment fails or has large residuals.
   std::optional<LampDisplacements> estimate_displacements(const LampMap& map) const {
     constexpr double no_limit = std::numeric_limits<double>::infinity();
     AdjustmentInput input{make_captures(map), map, {}};
@@ -158,6 +161,7 @@ struct MapCaptures {
     const std::size_t detections = count_detections(input.captures);
     // Rejected detections may leave others unconnected.
     for (std::size_t used = 0; count_detections(input.captures) != used;) {
+      if (input.captures.empty()) return std::nullopt;
       adjusted = run_bundle_adjustment(input, {no_limit, no_limit});
       constexpr double max_residual_fraction = 0.01;  // of the focal length; lenses are better
       if (!adjusted.has_succeeded() ||
@@ -369,15 +373,22 @@ class DisplacementTest {
   bool variance_is_known_ = true;
 };
 
+/// Returns true if most detections are outliers, so that the remaining lamps prove nothing.
+bool is_map_contradicted(const std::optional<LampDisplacements>& found) {
+  constexpr double min_inlier_fraction = 0.5;
+  return !found || found->inlier_fraction < min_inlier_fraction;
+}
+
 /// Alternative map that may explain the captures, with the displacements relative to it.
 struct OtherMap {
   MapError error;
   LampMap map;
   std::optional<LampDisplacements> found = {};
 
-  double compute_room_size_m() const {
-    return found && !found->lamps.empty() ? found->displacement_m.norm()
-                                          : std::numeric_limits<double>::infinity();
+  /// Returns the RMS displacement of the lamps; infinity if the captures contradict the map.
+  double compute_rms_displacement_m() const {
+    if (is_map_contradicted(found)) return std::numeric_limits<double>::infinity();
+    return found->displacement_m.norm() / std::sqrt(static_cast<double>(found->lamps.size()));
   }
 };
 
@@ -390,8 +401,8 @@ OtherMap swap_lamps(const LampMap& map, int first, int second) {
   return other;
 }
 
-/// Returns the two maps with two lamps swapped that have the smallest residuals, best first. Omits
-/// maps whose residuals are no smaller than those of the original map.
+/// Returns the two maps with two lamps swapped that have the smallest displacements, best first.
+/// Omits maps whose displacements are no smaller than those of the original map.
 std::vector<OtherMap> make_swapped_maps(const LampDisplacements& found, const LampMap& map) {
   std::vector<Eigen::Vector2d> lamps_m = found.map_m;
   Eigen::VectorXd displaced_m = found.displacement_m;
@@ -437,12 +448,6 @@ std::vector<OtherMap> make_all_swapped_maps(const LampMap& map) {
   return maps;
 }
 
-/// Returns true if most detections are outliers, so that the remaining lamps prove nothing.
-bool is_map_contradicted(const std::optional<LampDisplacements>& found) {
-  constexpr double min_inlier_fraction = 0.5;
-  return !found || found->inlier_fraction < min_inlier_fraction;
-}
-
 /// Returns true if the RMS displacement of the lamps exceeds the tolerance of Positioner, relative
 /// to the size of the map.
 bool is_map_of_other_room(const LampDisplacements& found) {
@@ -469,21 +474,30 @@ std::optional<MapError> find_swapped_lamps(const MapCaptures& captures, const La
   LampMap mirrored = map;
   for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
   others.push_back({{MapErrorKind::mirrored}, std::move(mirrored)});
-  for (OtherMap& other : others) other.found = captures.estimate_displacements(other.map);
-  std::ranges::sort(others.begin(), others.end() - 1, {}, &OtherMap::compute_room_size_m);
+  // Few captures suffice to contradict a wrong map.
+  constexpr std::size_t max_captures = 50;
+  MapErrorOptions options = captures.options;
+  if (is_contradicted) options.max_captures = std::min(options.max_captures, max_captures);
+  const MapCaptures few{captures.frames, captures.calibration, options};
+  for (OtherMap& other : others) other.found = few.estimate_displacements(other.map);
+  std::ranges::sort(others.begin(), others.end() - 1, {}, &OtherMap::compute_rms_displacement_m);
   // The mirror image of a square equals a square with two corners swapped.
   const bool is_mirrored =
-      others.back().compute_room_size_m() <= 2 * others.front().compute_room_size_m();
+      others.back().compute_rms_displacement_m() <= 2 * others.front().compute_rms_displacement_m();
   const std::size_t best = is_mirrored ? others.size() - 1 : 0;
   if (!explains_captures(others[best])) return std::nullopt;
-  if (is_contradicted) return others[best].error;
+  if (is_contradicted) {
+    if (!is_mirrored && others.size() > 2 && explains_captures(others[1])) return std::nullopt;
+    return others[best].error;
+  }
   const DisplacementTest test(*others[best].found, map);
   const double added_m2 = test.compute_added_variance_m2({});
   const auto count = static_cast<double>(map.lamps.size());
   const double limit = test.fit_map_errors({}, added_m2).chi_squared +
                        test.compute_chi_squared_drop_bound(0, 1 + count * (count - 1) / 2);
   const auto is_worse = [&](const std::optional<LampDisplacements>& other) {
-    return !other || DisplacementTest(*other, map).fit_map_errors({}, added_m2).chi_squared > limit;
+    return is_map_contradicted(other) ||
+           DisplacementTest(*other, map).fit_map_errors({}, added_m2).chi_squared > limit;
   };
   if (!is_worse(found)) return std::nullopt;
   if (!is_mirrored && others.size() > 2 && !is_worse(others[1].found)) return std::nullopt;

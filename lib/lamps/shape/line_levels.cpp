@@ -82,7 +82,7 @@ std::optional<LineLevel> LineLevels::relative_scanline_level(int line) const {
 
 LineLevel LineLevels::predict_relative_scanline_level(int line) const {
   constexpr int max_periods = 4;
-  // The face may be dimmer near its edge: sd of one period away, of several, and of dark lines.
+  // The face may be dimmer near its edge: relative sd with one period, with several; absolute sd.
   constexpr double alone_sd = 0.2, several_sd = 0.05, dark_sd = 0.01;
   constexpr double missed = 1.5;  // interpolation error between two lines at the edge of a stripe
   const int last = first_ + static_cast<int>(measured_.size()) - 1;

@@ -23,8 +23,9 @@ struct LineLevel {
 ///
 /// Scanlines next to the edge of the light have no pixels inside it; their level is predicted. For
 /// modulated light it is the mean of the scanlines whole periods away. Its standard deviation
-/// combines the scatter of these, the interpolation between scanlines and the uncertainty of the
-/// period. For steady light it is the mean of the neighboring scanlines.
+/// combines the scatter of these, the interpolation between scanlines, the uncertainty of the
+/// period, and 5 % of the level (20 % with one period), as the face may be dimmer near its edge.
+/// For steady light it is the mean of the neighboring scanlines.
 class LineLevels {
  public:
   /// Measures the levels of a light. `chords` are its pixels on each scanline of the image `lines`.

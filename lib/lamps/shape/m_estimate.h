@@ -35,7 +35,7 @@ struct MEstimateStep {
 
 /// Computes a Gauss-Newton step from `distance(i)`, the CurveDistance of point i, for
 /// weights.size() points. The scale is the median distance of the points closer than four
-/// tolerances, and at least a tenth of the tolerance. Returns std::nullopt if less than N + 2
+/// tolerances, and at least a tenth of the tolerance. Returns std::nullopt if fewer than N + 2
 /// points remain, or if they do not determine the curve.
 template <int N, typename Distance>
 std::optional<MEstimateStep<N>> compute_m_estimate_step(std::span<const double> weights,

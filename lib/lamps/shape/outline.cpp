@@ -36,11 +36,11 @@ std::optional<double> find_level_crossing(const ImageView& image, int row, int b
 
 std::vector<Eigen::Vector2d> find_blob_outline(const ImageView& image, const Blob& blob,
                                                const Background& background) {
-  constexpr int min_width = 8, margin = 6;
+  constexpr int min_width_px = 8, margin_px = 6;
   constexpr double min_fraction = 0.35;
   std::vector<double> levels;
   for (const PixelRun& run : blob.runs)
-    levels.push_back(run.pixel_run_width_px() < min_width
+    levels.push_back(run.pixel_run_width_px() < min_width_px
                          ? 0
                          : compute_level_inside(image, run, background.level));
   const double min_level =
@@ -51,7 +51,7 @@ std::vector<Eigen::Vector2d> find_blob_outline(const ImageView& image, const Blo
     if (!(levels[i] > 0 && levels[i] >= min_level)) continue;
     const int middle = (begin + end) / 2;
     const double half = background.level + levels[i] / 2;
-    for (const int from : {begin - margin, end - 1 + margin}) {
+    for (const int from : {begin - margin_px, end - 1 + margin_px}) {
       const auto column = find_level_crossing(image, row, from, middle, half);
       if (column) points.emplace_back(*column, row);
     }

@@ -309,8 +309,8 @@ auto get_block(EndsCovariance& ends, std::size_t edge) {
 
 /// Moves the sides to the most probable rectangle, and updates the covariance (Kalman's update). A
 /// tilt error makes opposite sides converge by its product with their distance, in the plane at
-/// height 1, and changes right angles by get_tilt_sd(). Returns false, without a correction, if the
-/// angles contradict, because an object may hide a part.
+/// height 1, and changes right angles by get_tilt_sd(). Makes no correction if the angles
+/// contradict, because an object may hide a part.
 void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
                         EndsCovariance& covariance) {
   constexpr double clear = 16;      // chi-square of three angles: one in a thousand
@@ -495,7 +495,7 @@ std::optional<Place> predict_edge_position(const EdgeImage& image, const FoundEd
   return place;
 }
 
-/// Returns the distance of the middle between a side and the opposite one, in pixels.
+/// Returns half the distance between a side and the opposite one, in pixels.
 double compute_reach_px(const Sides& sides, std::size_t i, double per_px) {
   return compute_distance_from_line(sides[i], sides[(i + 2) % 4]) / per_px / 2;
 }

@@ -37,8 +37,8 @@ namespace vlp {
 ///                      reflector, which is a clearer circle than the rim
 /// @return light with its outline; std::nullopt if the blob is smaller than 8 px or has less than 5
 ///     lit scanlines; if no circle has such steps; if the outline has no fit, see
-///     fit_disc_outline(); if the standard deviation of the center is above 0.6 % of the radius; or
-///     if the radius is another one than the known one
+///     fit_disc_outline(); if the standard deviation of the center is above 0.6 % of the radius (1
+///     % of a known radius); or if the radius is another one than the known one
 std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob& blob,
                                               double period_lines, const Background& background,
                                               const LightShape& shape,

@@ -138,10 +138,10 @@ class Samples {
     return is_inside ? std::optional(at) : std::nullopt;
   }
 
-  /// Adds the pixels across the side at one of its pixels. Returns false if they are outside the
-  /// image or the plane.
+  /// Adds the pixels across the side at one of its pixels, up to a fraction of the side from its
+  /// middle. Returns false if they are outside the image or the plane.
   bool add_place(const Eigen::Vector2d& middle, int across, double reach_px,
-                 double max_off_middle) {
+                 double max_off_middle_fraction) {
     constexpr double apart_px = 2;
     const auto plane = [&](const Eigen::Vector2d& pixel) {
       return image_.shape.level_plane_point_from_pixel(
@@ -172,7 +172,7 @@ class Samples {
       if (!lit) continue;
       const Eigen::Vector2d away = *here + plane_from_pixel * (pixel - middle) - side_.from;
       const double t = away.dot(side_.edge_direction()) / length;
-      if (std::abs(t - 0.5) > max_off_middle) continue;
+      if (std::abs(t - 0.5) > max_off_middle_fraction) continue;
       const double fraction = image_.levels.level_at_column_relative_to_middle(column);
       samples.push_back({row,
                          {fraction * lit->level, fraction * lit->sd},

@@ -46,8 +46,10 @@ struct EdgeImage {
 ///
 /// The slopes are those of a light that is dimmer near its edge, and of the halo around it.
 struct EdgeProfile {
-  double blur_px, inside, inside_slope, outside, outside_slope;
+  double blur_px, inside, inside_slope, outside, outside_slope;  ///< slopes per px
 
+  /// Returns the level at a depth, as a fraction of that of the scanline. Slopes end 6 px from the
+  /// edge, and the level outside is not negative.
   double compute_level(double depth_px) const;
 };
 

@@ -186,16 +186,11 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   std::string run, verdict, ended_utc, measured_with;
   words >> run >> verdict >> ended_utc >> measured_with;
   const bool failed = verdict == verdict_name(Verdict::fail);
-  if ((!failed && verdict != verdict_name(Verdict::pass)) || ended_utc.empty()) {
+  if ((!failed && verdict != verdict_name(Verdict::pass)) || measured_with.empty()) {
     return describe_damaged_note(file.string() + " is damaged");
   }
   if (failed) {
     return fmt::format("the golden unit failed (run {}): repair the station, then {}", run, verify);
-  }
-  if (measured_with.empty()) {  // note of an older program
-    return fmt::format(
-        "the lamp map with which the golden unit was measured is unknown (run {}): {}", run,
-        verify);
   }
   if (measured_with != hash_measurement_settings(config)) {
     return fmt::format(

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/records/record_tables.h"
 
-#include <array>
 #include <stdexcept>
 #include <string>
 #include <vector>

@@ -441,10 +441,8 @@ std::vector<TrendPoint> Records::load_metric_trend(const std::string& metric,
 }
 
 std::optional<RunRecord> Records::find_run_by_id(const std::string& run) {
-  auto found = database_->run(
+  return database_->run(
       [&](ConnectionWatchdog&) { return load_run_with_all_parts(database_->sql, run); });
-  if (!found) return found;
-  return found;
 }
 
 TrailCheck Records::check_records_by_audit_trail(const std::string& expected_digest) {

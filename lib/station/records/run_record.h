@@ -176,7 +176,7 @@ struct SpooledRun {
 /// are not UTF-8 are escaped (escape_texts_of_run()).
 std::string serialize_spooled_run(const SpooledRun& spooled);
 /// Reads a run in the format of serialize_spooled_run(). A missing text of list_run_text_fields()
-/// is empty, as in files of older programs. Throws InputError with the file. Also throws it for a
+/// is empty. Throws InputError with the file. Also throws it for a
 /// run without a verdict, or if the name of run, camera or event is not a valid Id.
 SpooledRun read_spooled_run(const std::filesystem::path& file);
 
