@@ -200,7 +200,7 @@ TEST(DocumentationPages, CommandsOnPagesExitWithZero) {
   for (const char* name : {"datasets", "scripts"}) {
     fs::create_directory_symlink(kSource / name, folder / name);
   }
-  // What scripts/fetch_recordings.sh would fetch for the tutorial.
+  // The recordings that scripts/fetch_recordings.sh fetches for the tutorial.
   bool has_recordings = true;
   fs::create_directories(folder / "out/recordings");
   for (const char* name : {"aprilgrid-mocap", "chessboard-fisheye", "led-1khz-frame"}) {

@@ -136,7 +136,7 @@ class OverTime(unittest.TestCase):
             words = f"false alarms in {alarms} of {fleets} fleets" + (" that scatter by their sds only" if honest else "")
             if "VLP_FLEETS" in os.environ:
                 print(words)
-            # Of 40 at most 2 are expected; more than 6 in 1 of 200 such tests.
+            # At most 2 of 40 are expected; more than 6 occur in 1 of 200 such tests.
             self.assertLessEqual(alarms, 0.05 * fleets + 3 * (0.05 * fleets) ** 0.5, words)
 
     def test_false_alarm_rate_holds_for_unequal_sds(self):

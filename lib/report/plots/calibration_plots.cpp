@@ -142,7 +142,7 @@ std::string format_sd_map(const IntrinsicsPlot& plot) {
                         (plot.imager_px[1] - 1) / 2.0 / double(rows - 1), kPlotDigits);
   commands += "set cbrange [" + format_significant_digits(levels.front(), kPlotDigits) + ":" +
               format_significant_digits(levels.back(), kPlotDigits) + "]\nset cbtics (" + tics +
-              ")\nset logscale cb\nset cblabel 'standard deviation (px)'\n"
+              ")\nset logscale cb\n"
               "plot $map using 1:2:(" +
               half_u + "):(" + half_v +
               "):3 with boxxyerror fillstyle solid linecolor palette notitle";
@@ -176,10 +176,9 @@ std::string format_mtf50_map(const IntrinsicsPlot& plot) {
     map += format_gnuplot_data_row({(2 * double(col) + 1) * half_u - 0.5,
                                     (2 * double(row) + 1) * half_v - 0.5, plot.mtf50[i]});
   }
-  return make_gnuplot_data_block("mtf50", map) +
-         "set title 'sharpness: MTF50 of lens and pixel'\n"
-         "unset logscale cb\nset cbrange [0:*]\nset cbtics autofreq\n"
-         "set cblabel 'cycles per pixel'\nplot $mtf50 using 1:2:(" +
+  return make_gnuplot_data_block("mtf50", map) + "set title " +
+         quote_text_for_gnuplot("sharpness: MTF50 of lens and pixel\ncycles per pixel") +
+         "\nunset logscale cb\nset cbrange [0:*]\nset cbtics autofreq\nplot $mtf50 using 1:2:(" +
          format_significant_digits(half_u, kPlotDigits) + "):(" +
          format_significant_digits(half_v, kPlotDigits) +
          "):3 with boxxyerror fillstyle solid linecolor palette notitle\n";
@@ -287,7 +286,7 @@ Drawing make_intrinsics_plot_drawing(const IntrinsicsPlot& plot) {
       ":-0.5]\n"  // v downwards, as in the image
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
-      "set multiplot layout 2,2 margins 0.1,0.9,0.08,0.88 spacing 0.13,0.2 title " +
+      "set multiplot layout 2,2 margins 0.1,0.88,0.09,0.88 spacing 0.22,0.2 title " +
       quote_text_for_gnuplot(plot.title) +
       " noenhanced\n"
       "set title " +
@@ -302,9 +301,10 @@ Drawing make_intrinsics_plot_drawing(const IntrinsicsPlot& plot) {
       format_plot_commands(
           plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.5",
           arrows + "linewidth 2") +
-      "set title 'uncertainty of the projection'\n" + format_sd_map(plot) + format_mtf50_map(plot) +
-      "unset multiplot\n";
-  return {"intrinsics", 900, 280 + 720 * height / width, commands};
+      "set title " +
+      quote_text_for_gnuplot("uncertainty of the projection\nstandard deviation (px)") + "\n" +
+      format_sd_map(plot) + format_mtf50_map(plot) + "unset multiplot\n";
+  return {"intrinsics", 1000, 280 + 720 * height / width, commands};
 }
 
 IntrinsicsPlot collect_intrinsics_plot_data(const std::string& title,
