@@ -486,10 +486,6 @@ std::optional<MapError> find_swapped_lamps(const MapCaptures& captures, const La
       others.back().compute_rms_displacement_m() <= 2 * others.front().compute_rms_displacement_m();
   const std::size_t best = is_mirrored ? others.size() - 1 : 0;
   if (!explains_captures(others[best])) return std::nullopt;
-  if (is_contradicted) {
-    if (!is_mirrored && others.size() > 2 && explains_captures(others[1])) return std::nullopt;
-    return others[best].error;
-  }
   const DisplacementTest test(*others[best].found, map);
   const double added_m2 = test.compute_added_variance_m2({});
   const auto count = static_cast<double>(map.lamps.size());
