@@ -193,6 +193,13 @@ MeasuredLight make_light_from_modulation(const ModulatedLight& found,
   return light;
 }
 
+/// Returns the profile of a signal of consecutive scanlines; levels below the dark level are 0.
+LineProfile make_profile(const std::vector<PixelRun>& chords, const std::vector<double>& signal) {
+  LineProfile profile{chords.empty() ? 0.0 : chords.front().row, 1, signal};
+  for (double& level : profile.levels) level = std::max(0.0, level);
+  return profile;
+}
+
 /// Returns true if the image border cuts no part of a box.
 bool is_box_inside_image(const PixelBox& box, const ImageSize& size) {
   return box.x > 0 && box.y > 0 && box.end_column() < size.width && box.end_row() < size.height;
@@ -502,11 +509,16 @@ void LightDetector::measure_stripes_in_outline(const ImageView& lines, const Bac
       light.outline_kind == LightOutline::rectangle
           ? find_chords_in_polygon(swap(light.inner_polygon), lines.size())
           : find_chords_in_ellipse(swap(light.box.min()), swap(light.box.max()), lines.size());
-  const auto signal = compute_scanline_signal(lines, chords, background.level);
-  Stripes stripes = measure_stripes(signal);
+  const auto signal =
+      compute_scanline_signal(lines, chords, background.level, light.has_bright_core);
+  const LineProfile profile = make_profile(chords, signal);
+  const auto period = identify_lamp_period(profile, lamp_periods_);
+  Stripes stripes =
+      period ? measure_stripes_of_period(profile, lamp_periods_[*period]) : measure_stripes(signal);
   if (!are_stripes_readable(stripes)) return;
-  const auto lamp = identify_lamp_by_stripes(stripes);
-  if (light.lamp && !(lamp && has_clear_outline(light))) return;
+  const auto lamp = period && lamps_by_period_[*period] ? lamps_by_period_[*period]
+                                                        : identify_lamp_by_stripes(stripes);
+  if (light.lamp && !period && !(lamp && has_clear_outline(light))) return;
   // An object may hide a part of the outline; the box of a slanted tube may contain other lights.
   stripes.coherence = std::max(
       light.stripes.coherence,

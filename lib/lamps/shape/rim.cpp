@@ -8,10 +8,12 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <numbers>
 #include <utility>
 #include <vector>
 
 #include "geometry/median.h"
+#include "lamps/signal/period_fit.h"
 
 namespace vlp {
 namespace {
@@ -94,7 +96,8 @@ struct RadiusRange {
 class Face {
  public:
   /// Computes means over `window` pixels of a scanline.
-  Face(const ImageView& image, const PixelBox& box, const Background& background, int window)
+  Face(const ImageView& image, const PixelBox& box, const Background& background, int window,
+       double period_lines)
       : box_(box), window_(window) {
     constexpr double fraction = 0.02;
     const auto dark = static_cast<float>(background.level);
@@ -107,7 +110,7 @@ class Face {
     const double brightest = *std::max_element(levels_.begin(), levels_.end());
     soft_ = std::max(fraction * brightest, (background.threshold - background.level) / 2);
     compute_moving_means();
-    find_scanlines_of_bright_stripes(background.threshold - background.level);
+    find_scanlines_of_bright_stripes(background.threshold - background.level, period_lines);
   }
 
   const PixelBox& box() const { return box_; }
@@ -158,27 +161,29 @@ class Face {
     }
   }
 
-  void find_scanlines_of_bright_stripes(double min_level) {
-    constexpr double min_lit = 0.55;
-    std::vector<double> brightest(static_cast<std::size_t>(box_.height));
-    std::vector<double> lit_levels;
+  /// Finds the scanlines in the brighter half of the period. Compares phases, because next to a
+  /// bright core the bright stripes of the rim are darker than the core is in a dark stripe.
+  void find_scanlines_of_bright_stripes(double min_level, double period_lines) {
+    LineProfile profile{double(box_.y), 1, {}};
+    std::vector<double> brightest, lit_levels;
     std::vector<float> line;
     for (int row = 0; row < box_.height; ++row) {
       const auto begin = levels_.begin() + std::ptrdiff_t(index(box_.y + row, box_.x));
       line.assign(begin, begin + box_.width);
+      double sum = 0;
+      for (const float level : line) sum += std::sqrt(std::max(0.F, level));
+      profile.levels.push_back(sum);
       const auto tenth = line.end() - 1 - std::ptrdiff_t(line.size() / 10);
       std::nth_element(line.begin(), tenth, line.end());
-      brightest[static_cast<std::size_t>(row)] = *tenth;
+      brightest.push_back(*tenth);
     }
-    const int near = std::max(8, box_.height / 10);
+    const PeriodFit fit = fit_periodic_signal(profile, period_lines);
     for (int row = 0; row < box_.height; ++row) {
-      const auto begin = brightest.begin() + std::max(0, row - near);
-      const auto end = brightest.begin() + std::min(box_.height, row + near + 1);
+      const double phase_rad = 2 * std::numbers::pi * (box_.y + row) / period_lines - fit.phase_rad;
       const double level = brightest[static_cast<std::size_t>(row)];
-      if (level > min_level && level > min_lit * *std::max_element(begin, end)) {
-        lit_.push_back(box_.y + row);
-        lit_levels.push_back(level);
-      }
+      if (level < min_level || (period_lines > 0 && std::cos(phase_rad) < 0)) continue;
+      lit_.push_back(box_.y + row);
+      lit_levels.push_back(level);
     }
     if (!lit_levels.empty()) bright_level_ = upper_median(std::move(lit_levels));
   }
@@ -190,11 +195,11 @@ class Face {
   std::vector<int> lit_;
 };
 
-/// Steps e of a subset of the lit scanlines at each border, for a light that begins there and for
-/// one that ends there.
+/// Steps e, up to `max_step`, of a subset of the lit scanlines at each border, for a light that
+/// begins there and for one that ends there.
 class Steps {
  public:
-  explicit Steps(const Face& face) : left_(face.box().x), width_(face.box().width) {
+  Steps(const Face& face, double max_step) : left_(face.box().x), width_(face.box().width) {
     constexpr std::size_t max_lines = 48;
     const std::vector<int>& lit = face.bright_stripe_scanlines();
     every_ = (lit.size() + max_lines - 1) / max_lines;
@@ -202,7 +207,7 @@ class Steps {
       lines_.push_back(lit[i]);
       for (int border = 0; border < width_; ++border) {
         for (const bool begins : {true, false}) {
-          e_.push_back(std::clamp(face.step(lit[i], left_ + border, begins), -0.7, 1.0));
+          e_.push_back(std::clamp(face.step(lit[i], left_ + border, begins), -0.7, max_step));
         }
       }
     }
@@ -254,10 +259,11 @@ class Steps {
 /// Returns the ring with the largest sum. Rings are circles in the level plane, whose derivative is
 /// `unit_plane_from_pixel`.
 Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_plane_from_pixel,
-                    const RadiusRange& range) {
+                    const RadiusRange& range, double max_step) {
   constexpr double fine = 20, max_shift = 0.35;
-  const Steps steps(face);
-  const double size = std::max(blob.width, blob.height), step = std::max(1.0, size / 2 / fine);
+  const Steps steps(face, max_step);
+  const double size = std::max(blob.width, blob.height),
+               step = std::max(1.0, std::min(size / 2, range.max_px) / fine);
   const Eigen::Vector2d middle(blob.x + blob.width / 2.0, blob.y + blob.height / 2.0);
   Ring best{{middle, unit_plane_from_pixel}, -std::numeric_limits<double>::infinity()};
   const auto search = [&](const RadiusRange& radii, double max_shift_px) {
@@ -285,7 +291,7 @@ std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob
                                               const LightShape& shape,
                                               const std::optional<KnownRadius>& radius) {
   constexpr int min_size = 8, min_lines = 5;
-  constexpr double margin = 0.2, min_step = 0.28, min_known_step = 0.15, max_radius = 0.75,
+  constexpr double margin = 0.2, min_step = 0.28, min_known_step = 0.1, max_radius = 0.75,
                    max_sds = 2;
   constexpr double min_start_blur_px = 1.5, start_blur = 0.04, max_center_sd = 0.006,
                    max_known_center_sd = 0.01;
@@ -296,6 +302,8 @@ std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob
   if (!plane_from_pixel) return std::nullopt;
   const double plane_per_px = std::sqrt(std::abs(plane_from_pixel->determinant()));
   const double blob_size = std::max(box.width, box.height);
+  const int margin_px = static_cast<int>(margin * blob_size);
+  const PixelBox wide = expand_and_clip_box(box, margin_px, image.size());
   RadiusRange range{blob_size / 6, max_radius * blob_size};
   if (radius) {
     const double radius_px = radius->radius / plane_per_px,
@@ -303,19 +311,19 @@ std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob
     range = {std::max(range.min_px, radius_px / factor),
              std::min(range.max_px, radius_px * factor)};
   }
-  const int margin_px = static_cast<int>(margin * blob_size);
-  const PixelBox wide = expand_and_clip_box(box, margin_px, image.size());
   const int size = std::max(wide.width, wide.height),
             window = std::max(std::clamp(size / 30, 2, 6), size / 50);
-  const Face face(image, wide, background, window);
+  const Face face(image, wide, background, window, period_lines);
   if (face.bright_stripe_scanlines().size() < min_lines) return std::nullopt;
   // Without a lens the axis ratio of a disc is unknown.
   constexpr double min_oval_gain = 1.2;
   Matrix2 unit_from_pixel = *plane_from_pixel / plane_per_px;
-  Ring best = find_best_ring(face, box, unit_from_pixel, range);
+  // The steps of a bright core must not exceed those of a dim rim of known radius.
+  const double max_step = radius ? 0.5 : 1;
+  Ring best = find_best_ring(face, box, unit_from_pixel, range, max_step);
   const auto blob_shape = shape.has_known_lens() ? std::nullopt : compute_shape_of_blob(blob);
   if (blob_shape) {
-    const Ring oval = find_best_ring(face, box, *blob_shape, range);
+    const Ring oval = find_best_ring(face, box, *blob_shape, range, max_step);
     if (oval.sum > min_oval_gain * best.sum) {
       best = oval;
       unit_from_pixel = *blob_shape;

@@ -21,14 +21,15 @@ namespace vlp {
 ///
 ///     e = log((i + c) / (o + c)) - max(0, log((b + c) / (i + c))),   clamped to -0.7 to 1,
 ///
-/// with the mean levels of a few pixels outside the border, o, inside it, i, and behind the latter,
-/// b. The constant c is half of the noise threshold, and at least 2 % of the brightest level.
+/// or to -0.7 to 0.5 if the radius is known, with the mean levels of a few pixels outside the
+/// border, o, inside it, i, and behind the latter, b. The constant c is half of the noise
+/// threshold, and at least 2 % of the brightest level.
 ///
-/// 1. Searches the circle in the level plane whose crossings with the lit scanlines have the
-/// largest sum of e. Its mean has to be at least 0.28, or 0.15 if the radius is known. (Daugman
-/// 1993 sums steps of irises.) Circles in the image would follow a part of a rim that is viewed
-/// obliquely. Without a lens also the ellipse with the second moments of the blob is searched. It
-/// is used if its sum is 1.2 times as large.
+/// 1. Searches the circle in the level plane whose crossings with the scanlines in the brighter
+/// half of the period have the largest sum of e. Its mean has to be at least 0.28 if the radius is
+/// unknown. (Daugman 1993 sums steps of irises.) Circles in the image would follow a part of a rim
+/// that is viewed obliquely. Without a lens also the ellipse with the second moments of the blob is
+/// searched. It is used if its sum is 1.2 times as large.
 ///
 /// 2. Fits the outline to the pixels near this circle, see fit_disc_outline().
 ///

@@ -89,12 +89,34 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
   return profile;
 }
 
-std::size_t find_best_matching_lamp(const RegionCandidate& candidate) {
-  const auto best = std::min_element(candidate.lamp_fits.begin(), candidate.lamp_fits.end(),
-                                     [](const PeriodFit& a, const PeriodFit& b) {
-                                       return a.unexplained_fraction < b.unexplained_fraction;
-                                     });
-  return std::size_t(best - candidate.lamp_fits.begin());
+/// Fits the period of each lamp to a profile.
+std::vector<PeriodFit> fit_lamp_periods(const LineProfile& profile,
+                                        std::span<const double> lamp_periods_lines) {
+  std::vector<PeriodFit> fits;
+  for (const double period : lamp_periods_lines) {
+    fits.push_back(period < kMinPeriod_lines ? PeriodFit{period}
+                                             : fit_period_near(profile, period, kLampDrift));
+  }
+  return fits;
+}
+
+std::size_t find_best_matching_lamp(const std::vector<PeriodFit>& lamp_fits) {
+  const auto best = std::ranges::min_element(lamp_fits, {}, &PeriodFit::unexplained_fraction);
+  return std::size_t(best - lamp_fits.begin());
+}
+
+/// Returns the best lamp if it explains the profile and if every competing lamp is clearly worse.
+template <typename IsCompeting>
+std::optional<std::size_t> choose_lamp(const std::vector<PeriodFit>& lamp_fits,
+                                       const IsCompeting& is_competing) {
+  const std::size_t best = find_best_matching_lamp(lamp_fits);
+  if (lamp_fits[best].unexplained_fraction > kMaxUnexplained) return std::nullopt;
+  for (std::size_t i = 0; i < lamp_fits.size(); ++i) {
+    if (i != best && compute_log_ratio(lamp_fits[best], lamp_fits[i]) <= kMinLogRatio &&
+        is_competing(i))
+      return std::nullopt;
+  }
+  return best;
 }
 
 /// Returns true if two fits have the same phase at a scanline between two regions, where the effect
@@ -118,17 +140,12 @@ using Claims = std::vector<const RegionCandidate*>;
 /// assigned to another candidate does not compete, unless the phase indicates that this candidate
 /// is a part or a mirror image of it.
 void assign_lamp(const Claims& claims, RegionCandidate& candidate) {
-  if (candidate.lamp_fits.empty() || !candidate.is_modulated || candidate.is_other_period) return;
-  const std::size_t best = find_best_matching_lamp(candidate);
-  const PeriodFit& fit = candidate.lamp_fits[best];
-  if (fit.unexplained_fraction > kMaxUnexplained) return;
-  for (std::size_t i = 0; i < candidate.lamp_fits.size(); ++i) {
-    const PeriodFit& other = candidate.lamp_fits[i];
-    if (i == best || compute_log_ratio(fit, other) > kMinLogRatio) continue;
-    if (claims[i] == nullptr || are_in_phase(candidate, other, *claims[i], claims[i]->fit)) return;
-  }
-  candidate.lamp = best;
-  candidate.fit = fit;
+  const auto& fits = candidate.lamp_fits;
+  if (fits.empty() || !candidate.is_modulated || candidate.is_other_period) return;
+  candidate.lamp = choose_lamp(fits, [&](std::size_t i) {
+    return claims[i] == nullptr || are_in_phase(candidate, fits[i], *claims[i], claims[i]->fit);
+  });
+  if (candidate.lamp) candidate.fit = fits[*candidate.lamp];
 }
 
 /// Returns |sum z| / sum |z| over the cells of a region, where z is the complex amplitude of a cell
@@ -177,13 +194,9 @@ RegionCandidate examine_region(const CellLevels& cells, const ModulationMap& map
   candidate.profile = compute_profile(cells, map, candidate.region, margin);
   const LineProfile& profile = candidate.profile;
   candidate.fit = find_best_fitting_period(profile, min_period_lines);
-  for (const double period : lamp_periods_lines) {
-    candidate.lamp_fits.push_back(period < kMinPeriod_lines
-                                      ? PeriodFit{period}
-                                      : fit_period_near(profile, period, kLampDrift));
-  }
+  candidate.lamp_fits = fit_lamp_periods(profile, lamp_periods_lines);
   if (!lamp_periods_lines.empty()) {
-    const PeriodFit& lamp = candidate.lamp_fits[find_best_matching_lamp(candidate)];
+    const PeriodFit& lamp = candidate.lamp_fits[find_best_matching_lamp(candidate.lamp_fits)];
     candidate.is_other_period = compute_log_ratio(candidate.fit, lamp) > kMinLogRatio;
     if (!candidate.is_other_period) candidate.fit = lamp;
   }
@@ -238,18 +251,9 @@ void add_region_area(const ModulationMap& map, const ModulatedRegion& region, do
   }
 }
 
-/// Measures the stripes of a candidate after division by its envelope. Their period is that of a
-/// fit beyond the drift of the lamp, which does not depend on the given row time. Stripes that the
-/// ends of a light cut bias that of measure_stripes().
 Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
-  const PeriodFit fit =
-      fit_period_near(candidate.profile, candidate.fit.period_lines, 2 * kLampDrift);
-  Stripes stripes =
-      measure_stripes(divide_profile_by_envelope(candidate.profile, fit.period_lines));
-  stripes.period_lines = fit.period_lines;
-  stripes.periodicity_r2 = 1 - fit.unexplained_fraction;
+  Stripes stripes = measure_stripes_of_period(candidate.profile, candidate.fit.period_lines);
   stripes.periods = count_periods(candidate);
-  stripes.is_regular = true;
   stripes.coherence = candidate.phase_coherence;
   return stripes;
 }
@@ -460,6 +464,26 @@ std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
     }
   }
   return lights;
+}
+
+std::optional<std::size_t> identify_lamp_period(const LineProfile& profile,
+                                                std::span<const double> lamp_periods_lines) {
+  if (lamp_periods_lines.empty() || profile.levels.empty()) return std::nullopt;
+  const std::vector<PeriodFit> fits = fit_lamp_periods(profile, lamp_periods_lines);
+  const auto lamp = choose_lamp(fits, [](std::size_t) { return true; });
+  if (!lamp || fits[*lamp].depth <= kMinLightDepth) return std::nullopt;
+  const double shortest = *std::ranges::min_element(lamp_periods_lines);
+  const PeriodFit any = find_best_fitting_period(profile, std::max(kMinPeriod_lines, shortest / 2));
+  return compute_log_ratio(any, fits[*lamp]) > kMinLogRatio ? std::nullopt : lamp;
+}
+
+Stripes measure_stripes_of_period(const LineProfile& profile, double period_lines) {
+  const PeriodFit fit = fit_period_near(profile, period_lines, 2 * kLampDrift);
+  Stripes stripes = measure_stripes(divide_profile_by_envelope(profile, fit.period_lines));
+  stripes.period_lines = fit.period_lines;
+  stripes.periodicity_r2 = 1 - fit.unexplained_fraction;
+  stripes.is_regular = true;
+  return stripes;
 }
 
 }  // namespace vlp

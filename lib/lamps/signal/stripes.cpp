@@ -215,12 +215,13 @@ std::vector<PixelRun> find_chords_in_ellipse(const Eigen::Vector2d& low,
 }
 
 std::vector<double> compute_scanline_signal(const ImageView& image,
-                                            const std::vector<PixelRun>& chords, double dark) {
+                                            const std::vector<PixelRun>& chords, double dark,
+                                            bool has_bright_core) {
   std::vector<double> signal;
   signal.reserve(chords.size());
   for (PartLevels& parts : measure_parts(image, chords, dark)) {
     std::sort(parts.begin(), parts.end());
-    signal.push_back(parts[3]);
+    signal.push_back(parts[has_bright_core ? 1 : 3]);
   }
   return signal;
 }

@@ -31,9 +31,11 @@ std::vector<PixelRun> find_chords_in_ellipse(const Eigen::Vector2d& low,
                                              const Eigen::Vector2d& high, const ImageSize& size);
 
 /// Computes the level of each chord of a light above `dark`. Suppresses partial occlusion and
-/// specks: the level is that of the second brightest of five parts.
+/// specks: the level is that of the second brightest of five parts, or of the second darkest one if
+/// the light has a bright core, whose level varies between the scanlines.
 std::vector<double> compute_scanline_signal(const ImageView& image,
-                                            const std::vector<PixelRun>& chords, double dark);
+                                            const std::vector<PixelRun>& chords, double dark,
+                                            bool has_bright_core = false);
 
 /// Stripes of a light and their statistics.
 struct Stripes {

@@ -22,6 +22,16 @@ TEST(ComputeScanlineSignal, ReturnsMeanOfEachScanlineMinusDarkLevel) {
   }
 }
 
+TEST(ComputeScanlineSignal, ReturnsLevelBesideBrightCore) {
+  cv::Mat pixels(100, 120, CV_8U, cv::Scalar(30));
+  pixels(cv::Rect(57, 45, 10, 10)) = 200;
+  const ImageView image = to_image_view(pixels);
+  const auto signal = compute_scanline_signal(
+      image, find_chords_in_ellipse({40, 30}, {80, 70}, image.size()), 10, true);
+  ASSERT_EQ(signal.size(), 37U);
+  for (const double level : signal) EXPECT_DOUBLE_EQ(level, 20);
+}
+
 TEST(ComputeScanlineSignal, IgnoresScanlinesOutsideImage) {
   const cv::Mat pixels(100, 120, CV_8U, cv::Scalar(50));
   const ImageView image = to_image_view(pixels);

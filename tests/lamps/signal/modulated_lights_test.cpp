@@ -139,5 +139,40 @@ TEST(FindModulatedLights, ReturnsNoneForSteadyLightNoiseAndTinyImages) {
   EXPECT_TRUE(find_lights(cv::Mat(2, 100, CV_8U, cv::Scalar(200)), {}).empty());
 }
 
+/// Returns the profile of three periods of a rim whose level grows by a quarter.
+LineProfile make_uneven_profile(double period_lines, double phase) {
+  LineProfile profile{20, 1, {}};
+  const int lines = static_cast<int>(3 * period_lines);
+  for (int line = 0; line < lines; ++line) {
+    const double level = 20 + 5.0 * line / lines;
+    const double turn_rad = 2 * std::numbers::pi * (line / period_lines + phase);
+    profile.levels.push_back(level * (1 + 0.9 * std::sin(turn_rad)));
+  }
+  return profile;
+}
+
+TEST(IdentifyLampPeriod, IdentifiesThreePeriodsOfUnevenRim) {
+  constexpr std::array periods_lines{9.0, 12.0, 16.0, 21.0, 28.0};
+  constexpr int min_found = 12;  // of 25: few periods do not exclude neighbors
+  int found = 0;
+  for (std::size_t i = 0; i < periods_lines.size(); ++i) {
+    for (const double phase : {0., 0.2, 0.4, 0.6, 0.8}) {
+      const auto lamp =
+          identify_lamp_period(make_uneven_profile(periods_lines[i], phase), periods_lines);
+      if (!lamp) continue;
+      EXPECT_EQ(lamp, i) << phase;
+      ++found;
+    }
+  }
+  EXPECT_GE(found, min_found);
+}
+
+TEST(IdentifyLampPeriod, ReturnsNulloptForOtherPeriodSteadyLightAndNoLines) {
+  EXPECT_FALSE(identify_lamp_period(make_uneven_profile(33, 0), kLampPeriods_lines));
+  EXPECT_FALSE(identify_lamp_period({0, 1, std::vector<double>(60, 80)}, kLampPeriods_lines));
+  EXPECT_FALSE(identify_lamp_period({0, 1, {}}, kLampPeriods_lines));
+  EXPECT_FALSE(identify_lamp_period(make_uneven_profile(9, 0), {}));
+}
+
 }  // namespace
 }  // namespace vlp
