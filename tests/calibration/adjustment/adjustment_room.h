@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "calibration/adjustment/adjustment.h"
-#include "calibration/adjustment/adjustment_problem.h"
+#include "camera/lens.h"
 
 namespace vlp {
 
@@ -28,34 +28,65 @@ class AdjustmentRoom : public testing::Test {
   void scale_survey(double factor);
 
   /// Measures the input from the ground truth: detections with `sigma_px` and errors up to
-  /// `noise_px`, and known positions with errors below their standard deviations. Returns the
-  /// problem of this input in the state of the ground truth.
-  AdjustmentProblem make_problem(double sigma_px, double noise_px);
+  /// `noise_px`, and known positions with errors below their standard deviations.
+  void measure(double sigma_px, double noise_px);
 
+  /// Solution of the equations of adjustment.h by one dense matrix.
+  struct Solution {
+    /// Intrinsics, zenith, lever arm and the five lamps in view, with their covariance. The exact
+    /// lamp has none.
+    Eigen::VectorXd parameters;
+    Eigen::MatrixXd covariance;
+    /// Correction of the lens in standard deviations along each direction, with its covariance.
+    Eigen::Vector3d lens;
+    Eigen::Matrix3d lens_covariance;
+    /// Adjusted minus measured position of each known position: mean over its captures.
+    std::vector<Eigen::Vector3d> position_residuals_m;
+    double noise_scale, degrees_of_freedom;
+    /// Square root of the mean square of the whitened residuals per degree of freedom.
+    double residual;
+    double lamp_height_m;
+  };
   /// Solves without outliers. The noise scale is at least `min_scale`; it is increased to the
-  /// residuals until it changes by 1 % at most.
-  static AdjustmentProblem::GlobalCovariance solve_with_noise(AdjustmentProblem& problem,
-                                                              double min_scale);
-
-  /// Returns the sum of the squared whitened residuals.
-  static double sum_squares(const AdjustmentProblem& problem);
-
-  /// Returns the matrix from the state to intrinsics, zenith, lever arm and lamps.
-  static Eigen::MatrixXd parameters_from_state(const AdjustmentProblem& problem);
+  /// residuals until it changes by 1 % at most. If given, `whitening` converts the residual of each
+  /// detection in px to one in standard deviations, in the order of the input.
+  Solution solve(double min_scale, const std::vector<Eigen::Matrix2d>& whitening = {}) const;
 
   const Eigen::Vector3d kOrigin_m{12, -7, 2};
-  const Eigen::Vector2d kArm_m{0.03, -0.02};
   AdjustmentInput input;
-  std::vector<Pose> true_poses;
   std::vector<Eigen::Vector3d> true_lamps_m;
 
  private:
-  void add_at_pivot(const std::string& pivot, const Eigen::Vector3d& axis_m, double yaw_rad,
-                    const std::optional<KnownPosition>& place);
-  void add(const std::string& name, const Pose& camera, const std::optional<KnownPosition>& place);
-  /// Adds the detections of the five lamps in view to problem and input. Capture 3 lacks a lamp.
-  void add_sightings(AdjustmentProblem& problem, std::size_t capture, double sigma_px,
-                     double noise_px);
+  /// Values of the unknowns.
+  struct State {
+    Eigen::Vector3d lens;
+    Eigen::Vector2d zenith, arm_m;
+    std::vector<Eigen::Vector3d> lamps_m;
+    /// Position of the axis at a pivot, otherwise of the camera.
+    std::vector<Pose> poses;
+    std::vector<Eigen::Vector2d> velocities_m_per_s;
+    std::vector<double> yaw_rates_rad_per_s;
+  };
+  State make_true_state() const;
+  /// Returns the estimated unknowns of a state, or the state with these unknowns.
+  Eigen::VectorXd pack(const State& state) const;
+  State unpack(const Eigen::VectorXd& unknowns) const;
+  template <typename Visit>
+  void visit_unknowns(State& state, const Visit& visit) const;
+
+  Eigen::VectorXd compute_intrinsics(const State& state) const;
+  Lens make_lens(const State& state) const;
+  Eigen::Vector2d predict_pixel(const State& state, const Lens& lens, std::size_t capture,
+                                const Detection& detection) const;
+  Eigen::Vector3d predict_position(const State& state, std::size_t capture) const;
+  /// Returns the whitened residuals, those of the detections first.
+  Eigen::VectorXd compute_residuals(const State& state, double noise_scale,
+                                    const std::vector<Eigen::Matrix2d>& whitening) const;
+  void add(const std::string& name, const std::string& pivot, const Pose& pose,
+           const std::optional<KnownPosition>& place);
+
+  std::vector<Pose> true_poses_;
+  Eigen::MatrixXd lens_root_ = Eigen::MatrixXd::Zero(12, 3);
 };
 
 }  // namespace vlp

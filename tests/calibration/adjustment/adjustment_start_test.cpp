@@ -4,10 +4,8 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <cstddef>
 #include <limits>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -85,13 +83,13 @@ TEST(RunBundleAdjustmentStart, IsFitOfLampsThatAgreeToFractionOfTheirDistances) 
   EXPECT_LT(found.residual_px, 1e-3);
 }
 
-/// Two lamps at a distance of d px determine the height H with the standard deviation
-/// H sqrt(2) / d, if the noise is 1 px. It must be below H.
+/// Two lamps at a distance of d px determine the height H with the standard deviation H sqrt(2) /
+/// d, if the noise is 1 px. It must be below H.
 TEST(RunBundleAdjustmentStart, NeedsTwoLampsFartherApartThanRootTwoPixels) {
   for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}) {
     AdjustmentInput input = make_input_of_two_lamps(1.3 * direction);
     const AdjustmentResult near = run_bundle_adjustment(input);
-    EXPECT_EQ(near.undetermined, "no capture shows two lamps of the map clearly enough for a fix");
+    EXPECT_FALSE(near.has_succeeded());
     EXPECT_EQ(near.rejected_captures, 1);
     EXPECT_EQ(near.captures, 0);
     EXPECT_EQ(near.rejected_detections, 0);
@@ -168,29 +166,6 @@ TEST(RunBundleAdjustmentStart, UsesCalibratedLeverArm) {
   EXPECT_LT(found.residual_px, 1e-6);
 }
 
-/// Translation, yaw and scale of the lamps are fixed, and all else is estimated.
-TEST(RunBundleAdjustmentStart, FreeMapHasFiveFixedDirections) {
-  Survey survey;
-  survey.turn({0, 0, 0}, 6);
-  survey.turn({0.3, 0.1, 0.2}, 6);
-  survey.stand({{-0.3, 0.2, 0.1}, 1});
-  survey.input.map_prior = MapPrior::frame;
-  survey.input.lamps.lamps[2].position_m += Eigen::Vector3d(0.02, -0.01, 0.03);
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
-  ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
-  ASSERT_EQ(found.refined_covariance.rows(), 12 + 4 + 24);
-  EXPECT_LT(found.residual_px, 1e-6);
-  EXPECT_EQ(found.rejected_detections, 0);
-  const Eigen::VectorXd sds_m = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
-                                    found.refined_covariance.bottomRightCorner<24, 24>())
-                                    .eigenvalues()
-                                    .cwiseSqrt();
-  EXPECT_THAT(sds_m.head<5>(), IsNear(Eigen::VectorXd::Constant(5, 1e-6), 1e-7));
-  EXPECT_GT(sds_m[5], 5e-6);
-  ASSERT_EQ(found.refined_map.lamps.size(), 8U);
-  for (const Lamp& lamp : found.refined_map.lamps) EXPECT_LT(lamp.sd_m.value(), 1e-3);
-}
-
 /// The lever arm follows from known positions of the axis, without a pivot.
 TEST(RunBundleAdjustmentStart, AxisPositionsDetermineLeverArmButCameraPositionsDoNot) {
   for (const MeasuredPoint point : {MeasuredPoint::axis, MeasuredPoint::camera}) {
@@ -224,9 +199,6 @@ TEST(RunBundleAdjustmentStart, FailsForKnownPositionThatIsNoNumber) {
     survey.input.captures[0].known_position->xy_m.x() = std::numeric_limits<double>::quiet_NaN();
     const AdjustmentResult found = run_bundle_adjustment(survey.input);
     EXPECT_FALSE(found.has_succeeded());
-    EXPECT_EQ(found.undetermined,
-              "no zenith and no lamp positions fit the captures: is it the map of this room, and "
-              "the calibration of this camera?");
     EXPECT_EQ(found.refined_map.lamps.size(), 8U);
     EXPECT_EQ(found.camera.intrinsics, survey.input.calibration.camera.intrinsics);
     EXPECT_EQ(found.rejected_detections, 16);

@@ -7,7 +7,7 @@
 #include <Eigen/LU>
 
 #include "calibration/dispersion/station.h"
-#include "calibration/tilt/tilt_calibration.h"
+#include "geometry/angles.h"
 #include "positioning/positioner.h"
 #include "support/matchers.h"
 
@@ -152,9 +152,12 @@ TEST(EstimateDispersionOffset, StatusNamesTooFewCapturesWrongYawsFarReferenceOrO
   };
   const auto turned = station.captures(12, true, {0, 0});
   EXPECT_EQ(find_status({}), DispersionStatus::no_fix);
-  EXPECT_EQ(find_status({turned[0]}), DispersionStatus::too_few_captures);
+  EXPECT_EQ(find_status({turned[0], turned[4]}), DispersionStatus::too_few_captures);
+  EXPECT_EQ(find_status({turned[0], turned[4], turned[8]}), DispersionStatus::ok);
+  EXPECT_EQ(find_status({turned[0], turned[4], {{}, {0, 0}}}), DispersionStatus::too_few_captures);
   EXPECT_EQ(find_status({turned[0]}, DispersionMethod::chen_guan),
             DispersionStatus::too_few_captures);
+  EXPECT_EQ(find_status({turned[0], turned[0]}, DispersionMethod::chen_guan), DispersionStatus::ok);
   EXPECT_EQ(find_status(turned, DispersionMethod::chen_guan), DispersionStatus::several_yaws);
   EXPECT_EQ(find_status(station.captures_at(1, 20)), DispersionStatus::single_yaw);
   // A single capture at another yaw, with an error, must not decide.
@@ -162,6 +165,15 @@ TEST(EstimateDispersionOffset, StatusNamesTooFewCapturesWrongYawsFarReferenceOrO
   one_other.push_back(station.captures_at(2.5, 1)[0]);
   one_other.back().reference_point_m.x() += 0.05;
   EXPECT_EQ(find_status(one_other), DispersionStatus::single_yaw);
+  // Captures between 18 and 22 degrees apart vary by 9 and 11 degrees about their mean.
+  for (const double apart_deg : {18., 22.}) {
+    auto pair = station.captures_at(1, 6);
+    for (const auto& other : station.captures_at(1 + rad_from_deg(apart_deg), 6))
+      pair.push_back(other);
+    EXPECT_EQ(find_status(pair) == DispersionStatus::single_yaw, apart_deg < 20);
+    EXPECT_EQ(find_status(pair, DispersionMethod::chen_guan) == DispersionStatus::several_yaws,
+              apart_deg > 20);
+  }
   auto far = turned;
   for (auto& capture : far) capture.reference_point_m.x() += 1;
   EXPECT_EQ(find_status(far), DispersionStatus::all_far_from_reference);

@@ -81,22 +81,6 @@ TEST(FitAndAverageLampCircleCenters, CircleCentersMatchEllipseFormulaForTiltedCa
   }
 }
 
-TEST(FitAndAverageLampCircleCenters, RejectsOneDisplacedDetectionAsOutlier) {
-  const RotationScene scene;
-  std::vector<Frame> frames = scene.frames();
-  frames[3].detections[2].pixel += Eigen::Vector2d(12, -9);
-  const RotationCaptures rotation =
-      find_in_place_rotation_captures(frames, scene.map, scene.camera);
-  ASSERT_EQ(rotation.status, RotationStatus::ok);
-  const CircleCenters found = find_centers(rotation, scene.camera);
-  EXPECT_THAT(found.mean.center.center_px, IsNear(center_of_level_camera(scene), 1e-6));
-  ASSERT_EQ(found.mean.outliers.size(), 1U);
-  const RotationObservation& outlier = rotation.observations[found.mean.outliers[0].observation];
-  EXPECT_EQ(rotation.captures[outlier.capture].image, "3.png");
-  EXPECT_EQ(rotation.lamps[outlier.lamp].id, frames[3].detections[2].lamp);
-  EXPECT_EQ(found.mean.used_observations.size(), rotation.observations.size() - 1);
-}
-
 /// Returns frames of a camera at these yaws and one height, with noise of 0.3 px.
 std::vector<Frame> frames_at(RotationScene scene, const std::vector<double>& yaws_rad,
                              double height_m, Random& random) {
@@ -129,7 +113,7 @@ RotationCaptures captures_at(const std::vector<double>& yaws_rad, bool noise_is_
 
 /// With captures at two opposite yaws, only noise makes a triangle of the positions of a lamp.
 TEST(FitAndAverageLampCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
-  constexpr int draws = 25;
+  constexpr int draws = 8;
   Random random(31);
   for (const int count : {3, 6, 12, 40}) {
     for (const bool noise_is_stated : {true, false}) {
@@ -147,59 +131,8 @@ TEST(FitAndAverageLampCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
   }
 }
 
-/// Two positions of a lamp determine no circle for a tilted camera either.
-TEST(FitAndAverageLampCircleCenters, DoesNotConvergeAtTwoOppositeYawsWhenTilted) {
-  constexpr int draws = 25;
-  Random random(33);
-  const RotationScene scene = tilted_scene();
-  for (int i = 0; i < draws; ++i) {
-    const double yaw_rad = random.uniform(-M_PI, M_PI);
-    std::vector<double> yaws_rad;
-    for (int k = 0; k < 12; ++k) yaws_rad.push_back(yaw_rad + k % 2 * M_PI);
-    const RotationCaptures rotation = find_in_place_rotation_captures(
-        frames_at(scene, yaws_rad, 0, random), scene.map, scene.camera);
-    ASSERT_EQ(rotation.status, RotationStatus::ok);
-    EXPECT_FALSE(find_centers(rotation, scene.camera).mean.converged) << "draw " << i;
-  }
-}
-
-/// One of two heights has captures at two opposite yaws only; the other height is used.
-TEST(FitAndAverageLampCircleCenters, IgnoresHeightWithTwoOppositeYaws) {
-  constexpr int draws = 25;
-  Random random(34);
-  const RotationScene scene;
-  for (int i = 0; i < draws; ++i) {
-    const double yaw_rad = random.uniform(-M_PI, M_PI);
-    std::vector<double> all, opposite;
-    for (int k = 0; k < 8; ++k) {
-      all.push_back(yaw_rad + k * M_PI / 4);
-      opposite.push_back(yaw_rad + k % 2 * M_PI);
-    }
-    const std::vector<Frame> below = frames_at(scene, all, 0, random);
-    std::vector<Frame> both = below;
-    for (Frame& frame : frames_at(scene, opposite, 0.3, random)) both.push_back(std::move(frame));
-    const RotationCaptures spot_below =
-        find_in_place_rotation_captures(below, scene.map, scene.camera);
-    const RotationCaptures spot_both =
-        find_in_place_rotation_captures(both, scene.map, scene.camera);
-    ASSERT_EQ(spot_below.status, RotationStatus::ok);
-    ASSERT_EQ(spot_both.status, RotationStatus::ok);
-    ASSERT_EQ(spot_both.heights.size(), 2U);
-    const CircleCenters expected = find_centers(spot_below, scene.camera);
-    const CircleCenters found = find_centers(spot_both, scene.camera);
-    ASSERT_TRUE(expected.mean.converged);
-    ASSERT_TRUE(found.mean.converged);
-    EXPECT_THAT(found.mean.center.center_px, IsNear(expected.mean.center.center_px, 1e-9));
-    ASSERT_FALSE(expected.circles.empty());
-    ASSERT_FALSE(expected.mean.used_observations.empty());
-    EXPECT_EQ(found.circles.size(), expected.circles.size());
-    EXPECT_EQ(found.mean.used_observations, expected.mean.used_observations);
-    EXPECT_GT(found.undetermined, 0);
-  }
-}
-
 TEST(FitAndAverageLampCircleCenters, ConvergesWhenThirdYawJoinsOppositeYaws) {
-  constexpr int draws = 25;
+  constexpr int draws = 8;
   Random random(32);
   for (int i = 0; i < draws; ++i) {
     const double yaw_rad = random.uniform(-M_PI, M_PI);

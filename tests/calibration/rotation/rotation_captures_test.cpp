@@ -49,40 +49,6 @@ TEST(FindInPlaceRotationCaptures, ReturnsTrueHeightsYawsAxesAndLeverArm) {
   EXPECT_TRUE(rotation.rejected_captures.empty());
 }
 
-TEST(FitRotationAxis, ReturnsExactAxisFromTwoLampsAndThreeCaptures) {
-  RotationScene scene;
-  scene.tilt_rad = rad_from_deg(10);
-  scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}});
-  scene.captures = 3;
-  scene.arc_rad = 4;
-  expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
-}
-
-TEST(FitRotationAxis, ReturnsExactAxisForLampsAtSeveralHeights) {
-  RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
-  scene.map =
-      make_lamp_map({{-0.5, -0.35, 1.6}, {0.5, 0.2, 1.4}, {-0.4, 0.3, 1.8}, {0.1, -0.4, 1.5}});
-  expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
-}
-
-TEST(FitRotationAxis, ReturnsExactAxisForQuarterRotation) {
-  RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
-  scene.arc_rad = rad_from_deg(105);  // minus the uneven steps at the ends
-  expect_axis(fit_axis(scene, scene.frames()), scene, 1e-6);
-}
-
-TEST(FindInPlaceRotationCaptures, RejectsCapturesOfHeightWithOnlyTwoCaptures) {
-  const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
-  auto frames = scene.frames();
-  frames.resize(14);
-  const RotationCaptures rotation =
-      find_in_place_rotation_captures(frames, scene.map, scene.camera);
-  ASSERT_EQ(rotation.status, RotationStatus::ok);
-  EXPECT_EQ(rotation.heights.size(), 1U);
-  ASSERT_EQ(rotation.rejected_captures.size(), 2U);
-  EXPECT_EQ(rotation.rejected_captures[1].image, "13.png");
-}
-
 /// One third of the captures with a large error of one lamp and the noise of a poor detector.
 TEST(FitRotationAxis, RejectsDisplacedDetectionsInThirdOfCaptures) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});

@@ -29,15 +29,6 @@ void expect_exact(const RotationScene& scene) {
   }
 }
 
-TEST(FitRotationAxis, ReturnsExactAxisAtOneHeightWithoutLeverArm) {
-  for (const double tilt_deg : {0.0, 0.5, 2.0, 5.0, 10.0}) {
-    SCOPED_TRACE(tilt_deg);
-    RotationScene scene;
-    scene.tilt_rad = rad_from_deg(tilt_deg);
-    expect_exact(scene);
-  }
-}
-
 TEST(FitRotationAxis, FailsForCapturesAboutTwoAxes) {
   RotationScene scene, elsewhere;
   elsewhere.axis_m.x() += 0.07;

@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-constexpr int kSeeds = 20;
+constexpr int kSeeds = 8;
 
 /// Returns a scene with a ceiling of 2.6 m, where 10 cm are less than 4 % of the distance from the
 /// lamps.
@@ -42,21 +42,9 @@ TEST(FindInPlaceRotationCaptures, SeparatesHeightsTenCentimetersApart) {
     ASSERT_TRUE(found.converged && found.covariance);
     const double sd_rad = std::sqrt(found.covariance->topLeftCorner<2, 2>().trace() / 2);
     EXPECT_LT(sd_rad, rad_from_deg(0.1));
-    // For 20 draws of a planar normal distribution, none exceeds five standard deviations.
+    // For 8 draws of a planar normal distribution, none exceeds five standard deviations.
     EXPECT_LT(angle_between(found.center.zenith_in_camera, scene.truth().zenith_in_camera),
               5 * sd_rad);
-  }
-}
-
-TEST(FindInPlaceRotationCaptures, SeparatesFourHeightsWithinTwentyCentimeters) {
-  RotationScene scene = high_scene();
-  scene.heights_m = {0, 0.05, 0.15, 0.2};
-  for (int seed = 0; seed < kSeeds; ++seed) {
-    SCOPED_TRACE(seed);
-    Random random(static_cast<unsigned>(seed));
-    const RotationCaptures rotation = find_captures(scene, with_noise(scene.frames(0.1), random));
-    EXPECT_EQ(rotation.heights.size(), 4U);
-    EXPECT_TRUE(rotation.rejected_captures.empty());
   }
 }
 
@@ -86,19 +74,6 @@ TEST(FitRotationAxis, ReturnsExactLeverArmFromLampsAtSeveralHeights) {
   EXPECT_LT(angle_between(exact.center.zenith_in_camera, scene.truth().zenith_in_camera),
             rad_from_deg(1e-6));
   EXPECT_THAT(*exact.center.lever_arm_m, IsNear(scene.lever_arm_m, 1e-7));
-}
-
-/// Lamps whose heights differ by 2 mm determine a lever arm of 15 mm only to several centimeters.
-TEST(FitRotationAxis, OmitsLeverArmForLampsAtNearlyOneHeight) {
-  RotationScene scene = tilted_scene();
-  for (std::size_t i = 0; i < scene.map.lamps.size(); i += 2) {
-    scene.map.lamps[i].position_m.z() += 0.002;
-  }
-  Random random(1);
-  const RotationCaptures rotation = find_captures(scene, with_noise(scene.frames(0.3), random));
-  const RotationFit found = fit_rotation_axis(rotation, scene.camera);
-  ASSERT_TRUE(found.converged);
-  EXPECT_FALSE(found.center.lever_arm_m);
 }
 
 /// With a lever arm and a single height, fixes are those of the axis at that height.

@@ -6,7 +6,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <vector>
 
@@ -65,42 +64,6 @@ TEST(FitRotationModelToFixes, ReturnsSolutionOfMinimumNormForOneFix) {
   EXPECT_THAT(fit.delta, IsNear(Eigen::Vector2d(1.2, 0.4), 1e-12));
   const RotationModelFit with_arm = fit_rotation_model_to_fixes(fixes, 1, true);
   EXPECT_THAT(with_arm.lever_arm_m, IsNear(Eigen::Vector2d(0.5, 1. / 6), 1e-12));
-}
-
-/// At the solution, the gradient of the weighted squares is zero. Its weights are
-/// 1 / (1 + (r / s)^2) with s = 2 upper medians of the residuals.
-TEST(FitRotationModelToFixes, SolutionSatisfiesNormalEquationsWithCauchyWeights) {
-  std::vector<RotationFix> fixes;
-  constexpr std::size_t count = 11;
-  for (std::size_t k = 0; k < count; ++k) {
-    const double x = static_cast<double>(k);
-    fixes.push_back(make_exact_fix({0.3, -0.7}, {0, 0}, {0.03, 0.02}, 0.55 * x, 2 + 0.05 * x, 0));
-    fixes.back().pose.position_m.x() += 0.002 * std::sin(7 * x);
-    fixes.back().pose.position_m.y() += 0.002 * std::cos(4 * x);
-  }
-  fixes[4].pose.position_m.head<2>() += Eigen::Vector2d(0.03, -0.04);
-  const RotationModelFit fit = fit_rotation_model_to_fixes(fixes, 1, false);
-  ASSERT_EQ(fit.axes_m.size(), 1U);
-  ASSERT_EQ(fit.residuals_m.size(), count);
-  std::vector<double> sorted = fit.residuals_m;
-  std::sort(sorted.begin(), sorted.end());
-  const double scale_m = 2 * sorted[count / 2];
-  Eigen::Vector2d weighted_mean_m(0, 0), weighted_turned_m(0, 0);
-  double weights = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const auto& [pose, height_m, pivot] = fixes[k];
-    const Eigen::Rotation2Dd turn(pose.yaw_rad);
-    const Eigen::Vector2d error_m =
-        pose.position_m.head<2>() - fit.axes_m[0] - turn * (height_m * fit.delta);
-    EXPECT_NEAR(fit.residuals_m[k], error_m.norm(), 1e-12);
-    const double weight = 1 / (1 + error_m.squaredNorm() / (scale_m * scale_m));
-    weighted_mean_m += weight * error_m;
-    weighted_turned_m += weight * height_m * (turn.inverse() * error_m);
-    weights += weight;
-  }
-  EXPECT_THAT(weighted_mean_m / weights, IsNear(Eigen::Vector2d(0, 0), 1e-7));
-  EXPECT_THAT(weighted_turned_m / weights, IsNear(Eigen::Vector2d(0, 0), 1e-7));
-  EXPECT_NEAR(fit.residuals_m[4], 0.05, 0.004) << "up to the noise";
 }
 
 TEST(ComputeAngularCoverage, ReturnsZeroForFewerThanTwoAngles) {

@@ -4,7 +4,6 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <cmath>
 #include <functional>
 #include <numbers>
 #include <set>
@@ -65,6 +64,7 @@ std::vector<std::string> list_rejected_images(const RotationCaptures& rotation) 
 
 TEST(FindInPlaceRotationCaptures, RequiresThreeCapturesWithDetections) {
   RotationFrames frames((RotationScene()));
+  EXPECT_EQ(frames.find().status, RotationStatus::other_map) << "no capture";
   frames.add(0);
   frames.add(2);
   for (int i = 0; i < 3; ++i) frames.frames.push_back({"empty", {}});
@@ -194,15 +194,6 @@ TEST(FindInPlaceRotationCaptures, NumbersHeightsFromLowestAndRejectsOthers) {
   EXPECT_THAT(rotation.zenith_in_camera, IsNear(scene.truth().zenith_in_camera, 1e-6));
 }
 
-TEST(FindInPlaceRotationCaptures, HasNoLeverArmAtOneHeight) {
-  RotationFrames frames(tilted_scene({0.02, -0.03}));
-  frames.add_turn(6, 0);
-  const RotationCaptures rotation = frames.find();
-  ASSERT_EQ(rotation.status, RotationStatus::ok);
-  EXPECT_EQ(rotation.heights.size(), 1U);
-  EXPECT_EQ(rotation.lever_arm_m, Eigen::Vector2d(0, 0));
-}
-
 /// Each yaw occurs twice, with the axis displaced to either side. All distances from the mean axis
 /// are then equal. The limit of their median is 5 % of the height of the lamps.
 TEST(FindInPlaceRotationCaptures, ReturnsAxisMovedStatusForMedianDistanceAboveFivePercent) {
@@ -241,95 +232,6 @@ TEST(FindInPlaceRotationCaptures, RejectsCaptureFarFromAxisOfOthers) {
     ASSERT_EQ(rotation.observations.size(), 56U);
     EXPECT_EQ(rotation.observations[24].capture, 3U);
     EXPECT_EQ(rotation.observations[24].pixel, frames.frames[4].detections[0].pixel);
-  }
-}
-
-/// The limit is eight times the median distance of captures that scatter more.
-TEST(FindInPlaceRotationCaptures, RejectsCaptureBeyondEightMedianDistances) {
-  for (const double distance_m : {0.07, 0.09}) {
-    RotationFrames frames((RotationScene()));
-    for (int i = 0; i < 24; ++i) {
-      const double sign = i % 2 == 0 ? 1 : -1;
-      frames.add(i / 2, 0, 0.01 * sign * Eigen::Vector2d(0.6, 0.8));
-    }
-    frames.add(1.5, 0, {0, -distance_m});
-    const RotationCaptures rotation = frames.find();
-    ASSERT_EQ(rotation.status, RotationStatus::ok);
-    EXPECT_EQ(rotation.rejected_captures.size(), distance_m < 0.08 ? 0U : 1U);
-  }
-}
-
-/// Upper median of the standard deviations of the heights of fixes, for a level camera. The noise
-/// is that of the residuals; `noise_px` for fixes of two lamps, which have none.
-double compute_expected_height_sd_m(const RotationScene& scene, const std::vector<Frame>& frames,
-                                    double noise_px) {
-  Calibration calibration;
-  calibration.camera = scene.camera;
-  const Positioner positioner(scene.map, calibration);
-  std::vector<double> sds_m;
-  for (const Frame& frame : frames) {
-    std::vector<Detection> detections = frame.detections;
-    for (Detection& detection : detections) detection.sigma_px.reset();
-    const Fix fix = positioner.compute_position_fix(detections);
-    EXPECT_TRUE(fix.has_succeeded());
-    const double freedom = 2 * fix.lamps - 4;
-    const double noise =
-        freedom > 0 ? std::sqrt(fix.lamps * std::pow(fix.residual_px, 2) / freedom) : noise_px;
-    sds_m.push_back(noise * std::sqrt(fix.noise_covariance(2, 2)));
-  }
-  std::sort(sds_m.begin(), sds_m.end());
-  return sds_m[sds_m.size() / 2];
-}
-
-/// Returns frames at two heights.
-RotationFrames make_two_heights(const RotationScene& scene, double gap_m) {
-  RotationFrames frames(scene);
-  frames.add_turn(8, 0);
-  frames.add_turn(8, gap_m);
-  return frames;
-}
-
-/// Two lamps have no residuals. Three standard deviations by the stated noise separate heights.
-TEST(FindInPlaceRotationCaptures, SeparatesHeightsOfTwoLampsByThreeSdsOfStatedNoise) {
-  RotationScene scene;
-  scene.map = make_lamp_map({{-0.3, -0.25, 1.6}, {0.2, 0.2, 1.6}});
-  constexpr double gap_m = 0.1;
-  RotationFrames frames = make_two_heights(scene, gap_m);
-  const double limit_px = gap_m / (3 * compute_expected_height_sd_m(scene, frames.frames, 1));
-  for (const double factor : {0.95, 1.05}) {
-    for (Frame& frame : frames.frames) {
-      for (Detection& detection : frame.detections) detection.sigma_px = factor * limit_px;
-    }
-    const RotationCaptures rotation = frames.find();
-    ASSERT_EQ(rotation.status, RotationStatus::ok);
-    EXPECT_EQ(rotation.heights.size(), factor < 1 ? 2U : 1U) << limit_px << " px";
-    EXPECT_EQ(rotation.median_sigma_px, factor * limit_px);
-  }
-}
-
-/// Errors of the lamp map cause residuals. Three standard deviations by these residuals separate
-/// heights.
-TEST(FindInPlaceRotationCaptures, SeparatesHeightsByThreeSdsOfResidualsForThreeLampsOrMore) {
-  for (const std::size_t lamps : {std::size_t{3}, std::size_t{8}}) {
-    RotationScene truth;
-    truth.map.lamps.resize(lamps);
-    RotationScene scene = truth;
-    Random random(61);
-    for (Lamp& lamp : scene.map.lamps) {
-      lamp.position_m.x() += random.uniform(-0.02, 0.02);
-      lamp.position_m.y() += random.uniform(-0.02, 0.02);
-    }
-    const auto find = [&](double gap_m) {
-      return find_in_place_rotation_captures(make_two_heights(truth, gap_m).frames, scene.map,
-                                             scene.camera);
-    };
-    double gap_m = 0.05;
-    for (int i = 0; i < 5; ++i) {
-      gap_m = 3 * compute_expected_height_sd_m(scene, make_two_heights(truth, gap_m).frames, 1);
-    }
-    ASSERT_GT(gap_m, 0.02) << "above 1 % of the distance";
-    EXPECT_EQ(find(0.9 * gap_m).heights.size(), 1U) << lamps << " lamps, " << gap_m << " m";
-    EXPECT_EQ(find(1.1 * gap_m).heights.size(), 2U) << lamps << " lamps";
   }
 }
 
@@ -379,43 +281,14 @@ TEST(FindInPlaceRotationCaptures, ObservationsHaveRayOfEachKnownLamp) {
   }
 }
 
-TEST(FindInPlaceRotationCaptures, OmitsLampsThatOnlyRejectedCapturesDetect) {
-  RotationFrames frames((RotationScene()));
-  frames.add_turn(5, 0);
-  for (Frame& frame : frames.frames) frame.detections.resize(6);
-  frames.add(1, 0, {0.3, 0});
-  const RotationCaptures rotation = frames.find();
-  ASSERT_EQ(rotation.status, RotationStatus::ok);
-  EXPECT_THAT(list_rejected_images(rotation), testing::ElementsAre("5"));
-  EXPECT_EQ(rotation.lamps.size(), 6U);
-  EXPECT_EQ(rotation.observations.size(), 30U);
-}
-
-TEST(FindInPlaceRotationCaptures, ReturnsUpperMedianOfStatedNoise) {
-  RotationFrames frames((RotationScene()));
-  frames.add_turn(4, 0);
-  double sigma_px = 0.1;
-  for (Frame& frame : frames.frames) {
-    for (Detection& detection : frame.detections) detection.sigma_px = sigma_px += 0.01;
-  }
-  const RotationCaptures rotation = frames.find();
-  ASSERT_EQ(rotation.status, RotationStatus::ok);
-  ASSERT_TRUE(rotation.median_sigma_px);
-  EXPECT_NEAR(*rotation.median_sigma_px, 0.1 + 0.01 * 17, 1e-12);
-}
-
 TEST(DescribeRotationStatus, DescribesEachStatusDifferently) {
-  std::set<std::string> descriptions;
+  std::set<std::string> descriptions{""};
   for (const auto status :
        {RotationStatus::ok, RotationStatus::other_map, RotationStatus::too_few_lamps,
         RotationStatus::too_few_captures, RotationStatus::single_yaw, RotationStatus::short_arc,
         RotationStatus::axis_moved}) {
-    descriptions.emplace(describe_rotation_status(status));
+    EXPECT_TRUE(descriptions.emplace(describe_rotation_status(status)).second);
   }
-  EXPECT_EQ(descriptions.size(), 7U);
-  EXPECT_FALSE(descriptions.contains(""));
-  EXPECT_THAT(std::string(describe_rotation_status(RotationStatus::short_arc)),
-              testing::HasSubstr("less than 90 degrees"));
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 
 #include <cmath>
 #include <numbers>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -164,15 +163,6 @@ TEST(FitAndAverageLampCircleCenters, CenterIsDeterminedUpToQuarterNoiseAcrossOpp
   }
 }
 
-/// Points at 0, 0, and +-a: along their direction, the information about the mean is
-/// (1 - cos a)^2, and the contribution of the noise s^2 / R^2 2 sin^2 a.
-TEST(FitAndAverageLampCircleCenters, CenterIsDeterminedUpToQuarterNoiseAlongShortArc) {
-  constexpr double a = 1;
-  const double limit = 0.3 * std::sqrt(0.25 * std::pow(1 - std::cos(a), 2) / 2) / std::sin(a);
-  EXPECT_TRUE(is_determined({0, a, 0, -a}, 0.98 * limit));
-  EXPECT_FALSE(is_determined({0, a, 0, -a}, 1.02 * limit));
-}
-
 /// Points on a straight line determine no circle.
 TEST(FitAndAverageLampCircleCenters, UsesHeightOnlyIfMostOfItsCirclesAreDetermined) {
   const auto angles = make_equal_angles(5);
@@ -205,30 +195,6 @@ TEST(FitAndAverageLampCircleCenters, UsesHeightOnlyIfMostOfItsCirclesAreDetermin
   const CircleCenters few = find_centers(make(1, 3));
   EXPECT_FALSE(few.mean.converged);
   EXPECT_EQ(few.undetermined, 3);
-}
-
-TEST(FitAndAverageLampCircleCenters, ResidualIsThatOfUsedHeight) {
-  const auto angles = make_equal_angles(9);
-  TracedCaptures traced(2, 2);
-  for (const std::size_t height : {std::size_t{0}, std::size_t{1}}) {
-    for (const double angle : angles) traced.add_capture(angle, height);
-  }
-  std::vector<double> deviations;
-  for (int i = 0; i < 9; ++i) deviations.push_back(1e-3 * std::sin(2 * i + 1));
-  traced.add_circle(0, 0, {{0.02, -0.01}, 0.3}, angles, deviations);
-  deviations[4] = 0.2;
-  traced.add_circle(9, 1, {{0.02, -0.01}, 0.3}, angles, deviations);
-  for (std::size_t i = 0; i < 9; ++i) {
-    traced.add_point(9 + i, 0, {0.01 * angles[i], 0.02 * angles[i]});
-  }
-  const CircleCenters found = find_centers(traced);
-  ASSERT_TRUE(found.mean.converged);
-  EXPECT_EQ(found.undetermined, 1);
-  ASSERT_EQ(found.circles.size(), 1U);
-  EXPECT_EQ(found.mean.used_observations.size(), 9U);
-  EXPECT_NEAR(found.mean.residual_px, kFocalX_px * found.circles[0].fit.rms * std::sqrt(9. / 6),
-              1e-9);
-  EXPECT_NEAR(found.spread_px, 0, 1e-9);
 }
 
 TEST(FitAndAverageLampCircleCenters, UsesInliersOfConvergedAxisOnly) {
