@@ -3,20 +3,15 @@
 /// Limits of the errors of a lamp map, and their descriptions.
 #include <gmock/gmock.h>
 
-#include <Eigen/LU>
-#include <Eigen/QR>
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
-#include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "calibration/map/map_errors.h"
 #include "camera/lens.h"
-#include "geometry/plane.h"
 #include "positioning/inclination_rotation.h"
 #include "support/matchers.h"
 #include "support/random.h"
@@ -55,35 +50,20 @@ TEST(DescribeMapError, RoundsOffsetsToWholeMillimetersFromTenMillimetersOn) {
               testing::HasSubstr("hangs 10 mm from where the map has it (x +0 mm, y +10 mm)"));
 }
 
-TEST(DescribeMapError, NamesLampsAndCapturesOfOtherKinds) {
-  MapError unsteady{MapErrorKind::inconsistent, {4}};
-  unsteady.contradicting_captures = 3;
-  unsteady.captures = 20;
-  EXPECT_EQ(describe_map_error(unsteady),
-            "lamp 4 contradicts the other lamps in 3 of 20 captures, in varying directions: it is "
-            "confused with another light, was moved between captures, or has a wrong height");
-  EXPECT_EQ(describe_map_error({MapErrorKind::swapped, {5, 2}}),
-            "lamps 5 and 2 seem to be swapped: the captures fit the map if their positions or ids "
-            "are exchanged");
-  EXPECT_EQ(describe_map_error({MapErrorKind::mirrored}),
-            "the lamp map seems to be mirrored, as if drawn from below: the captures fit its "
-            "mirror image; change the sign of x or of y of every lamp");
-  EXPECT_EQ(describe_map_error({MapErrorKind::other_room}),
-            "most captures contradict the lamp map: is it the map of this room, and the "
-            "calibration of this camera?");
-  EXPECT_EQ(describe_map_error({MapErrorKind::undetected, {6}}),
-            "lamp 6 is never visible: is it lit, and not overexposed?");
-}
-
-TEST(DescribeMapErrors, SeparatesErrorsBySemicolons) {
-  const std::vector<MapError> errors{{MapErrorKind::undetected, {6}},
-                                     {MapErrorKind::undetected, {2}}};
+TEST(DescribeMapErrors, DescribesEachKindDifferently) {
+  MapErrors found;
+  std::set<std::string> descriptions{""};
+  for (const MapErrorKind kind :
+       {MapErrorKind::moved, MapErrorKind::inconsistent, MapErrorKind::swapped,
+        MapErrorKind::mirrored, MapErrorKind::other_room, MapErrorKind::undetected}) {
+    found.errors.push_back({kind, {5, 2}});
+    EXPECT_TRUE(descriptions.insert(describe_map_error(found.errors.back())).second);
+  }
+  std::size_t length = 0;
+  for (const std::string& description : descriptions) length += description.size();
+  EXPECT_EQ(describe_map_errors(found.errors).size(), length + 5 * 2) << "separated by semicolons";
   EXPECT_EQ(describe_map_errors({}), "");
-  EXPECT_EQ(describe_map_errors(errors),
-            "lamp 6 is never visible: is it lit, and not overexposed?; lamp 2 is never visible: is "
-            "it lit, and not overexposed?");
-  EXPECT_THAT(describe_lamps_moved_since_calibration(3),
-              testing::StartsWith("3 lamps have other positions than in the adjustment"));
+  EXPECT_THAT(describe_lamps_moved_since_calibration(3), testing::StartsWith("3 lamps"));
 }
 
 TEST(IsLampMapUnusable, HoldsForSwappedOrMirroredLampsOnly) {
@@ -152,53 +132,6 @@ class DetectLampErrorsAtLimits : public testing::Test {
   Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
   void set_survey_sd(double sd_m) {
     for (Lamp& lamp : map.lamps) lamp.sd_m = sd_m;
-  }
-
-  /// Displacements of lamps without their similarity, and the sums of their squares that other
-  /// lamps leave.
-  struct Shape {
-    Eigen::VectorXd displacement_m;
-    Eigen::MatrixXd projector;
-
-    /// Returns the sum of squares that the offsets of `free` lamps do not explain.
-    double sum_squares_m2(const std::vector<std::size_t>& free) const {
-      if (free.empty()) return displacement_m.squaredNorm();
-      Eigen::MatrixXd columns(projector.rows(), 2 * std::ssize(free));
-      for (std::size_t k = 0; k < free.size(); ++k) {
-        columns.middleCols(2 * static_cast<Eigen::Index>(k), 2) =
-            projector.middleCols(2 * static_cast<Eigen::Index>(free[k]), 2);
-      }
-      return (displacement_m - columns * columns.colPivHouseholderQr().solve(displacement_m))
-          .squaredNorm();
-    }
-    /// Returns the smallest sum of squares that another lamp than `lamp` leaves.
-    double sum_squares_of_others_m2(std::size_t lamp) const {
-      double min_m2 = std::numeric_limits<double>::infinity();
-      for (std::size_t other = 0; 2 * static_cast<Eigen::Index>(other) < displacement_m.size();
-           ++other) {
-        if (other != lamp) min_m2 = std::min(min_m2, sum_squares_m2({other}));
-      }
-      return min_m2;
-    }
-  };
-  /// Returns the displacements of the true lamps relative to the map.
-  Shape compute_shape() const { return compute_shape(map); }
-  Shape compute_shape(const LampMap& other) const {
-    const Eigen::Index lamps = std::ssize(other.lamps);
-    Eigen::MatrixXd similarity(2 * lamps, 4);
-    Eigen::VectorXd difference_m(2 * lamps);
-    for (Eigen::Index i = 0; i < lamps; ++i) {
-      const auto lamp = static_cast<std::size_t>(i);
-      const Eigen::Vector2d p = other.lamps[lamp].position_m.head<2>();
-      similarity.middleRows(2 * i, 2) << 1, 0, -p.y(), p.x(), 0, 1, p.x(), p.y();
-      difference_m.segment<2>(2 * i) = rig.map.lamps[lamp].position_m.head<2>() - p;
-    }
-    const Eigen::MatrixXd inverse = (similarity.transpose() * similarity).inverse();
-    Shape shape;
-    shape.projector = Eigen::MatrixXd::Identity(2 * lamps, 2 * lamps) -
-                      similarity * inverse * similarity.transpose();
-    shape.displacement_m = shape.projector * difference_m;
-    return shape;
   }
 
   SyntheticRig rig{{}, {}, {{0, 0, 0}, 0}, {}};
@@ -273,19 +206,6 @@ TEST_F(DetectLampErrorsAtLimits, InclinationsRotateWithYawOfCameraOnRobot) {
   }
 }
 
-TEST_F(DetectLampErrorsAtLimits, UsesEveryNthCaptureOfManyCaptures) {
-  const auto count_used = [&](int captures, std::size_t max_captures) {
-    options.max_captures = max_captures;
-    take_captures(captures);
-    const MapErrors found = detect();
-    return found.offsets.empty() ? 0 : found.offsets[0].captures;
-  };
-  EXPECT_EQ(count_used(5, 5), 5);
-  EXPECT_EQ(count_used(6, 5), 3);
-  EXPECT_EQ(count_used(10, 5), 5);
-  EXPECT_EQ(count_used(11, 5), 4);
-}
-
 /// Captures with two lamps, lamps that are detected twice, and ids that are not in the map.
 TEST_F(DetectLampErrorsAtLimits, UsesCapturesWithThreeUniqueLampsOfTheMap) {
   frames[0].detections.resize(2);
@@ -302,74 +222,6 @@ TEST_F(DetectLampErrorsAtLimits, UsesCapturesWithThreeUniqueLampsOfTheMap) {
     EXPECT_THAT(offset.offset_m, IsNear(Eigen::Vector2d(0, 0), 1e-6));
   }
   EXPECT_THAT(captures, ElementsAre(10, 11, 11, 9, 10, 10, 10, 10));
-}
-
-/// The bound is -2 ln(0.01 / 8) if the standard deviations of the survey are known.
-TEST_F(DetectLampErrorsAtLimits, MovedLampIsSignificantFromChiSquaredBoundOn) {
-  constexpr std::size_t lamp = 4;
-  constexpr double sd_m = 2e-4;
-  const double bound = -2 * std::log(0.01 / 8);
-  set_survey_sd(sd_m);
-  place(lamp) += Eigen::Vector3d(3e-3, -4e-3, 0);
-  const double of_5_mm = compute_shape().sum_squares_of_others_m2(lamp) / (sd_m * sd_m);
-  for (const double fraction : {0.97, 1.03}) {
-    const double factor = std::sqrt(fraction * bound / of_5_mm);
-    place(lamp) = rig.map.lamps[lamp].position_m + factor * Eigen::Vector3d(3e-3, -4e-3, 0);
-    const MapErrors found = detect();
-    ASSERT_THAT(found.offsets, SizeIs(8));
-    if (fraction < 1) {
-      EXPECT_THAT(found.errors, IsEmpty());
-      continue;
-    }
-    ASSERT_THAT(found.errors, SizeIs(1));
-    EXPECT_EQ(found.errors[0].kind, MapErrorKind::moved);
-    EXPECT_THAT(found.errors[0].lamps, ElementsAre(5));
-    EXPECT_THAT(found.errors[0].offset_m,
-                IsNear(Eigen::Vector3d(factor * Eigen::Vector3d(-3e-3, 4e-3, 0)), 1e-6));
-    const double own = compute_shape().projector(2 * lamp, 2 * lamp);
-    EXPECT_THAT(found.errors[0].sd_m,
-                IsNear(Eigen::Vector3d(sd_m / std::sqrt(own), sd_m / std::sqrt(own), 0), 2e-6));
-  }
-}
-
-/// Without known standard deviations, the other lamps determine the variance of the survey: with 10
-/// degrees of freedom the sum of squares has to increase by the factor (0.01 / 8)^(-2 / 10).
-TEST_F(DetectLampErrorsAtLimits, MovedLampIsSignificantFromBoundOfFDistributionOn) {
-  constexpr std::size_t lamp = 6;
-  const double bound = std::pow(0.01 / 8, -0.2);
-  std::vector<Eigen::Vector3d> errors_m;
-  for (std::size_t i = 0; i < 8; ++i) {
-    const double n = static_cast<double>(i);
-    errors_m.emplace_back(3e-4 * Eigen::Vector3d(std::sin(9 * n + 1), std::cos(7 * n), 0));
-  }
-  const Eigen::Vector3d direction(0.6, 0.8, 0);
-  const auto compute_ratio = [&](double offset_m) {
-    for (std::size_t i = 0; i < 8; ++i) place(i) = rig.map.lamps[i].position_m + errors_m[i];
-    place(lamp) += offset_m * direction;
-    const Shape shape = compute_shape();
-    return shape.sum_squares_of_others_m2(lamp) / shape.sum_squares_m2({lamp});
-  };
-  for (const double fraction : {0.97, 1.03}) {
-    double low_m = 0, high_m = 0.02;
-    ASSERT_GT(compute_ratio(high_m), bound * fraction);
-    for (int iteration = 0; iteration < 40; ++iteration) {
-      const double middle_m = (low_m + high_m) / 2;
-      (compute_ratio(middle_m) < bound * fraction ? low_m : high_m) = middle_m;
-    }
-    ASSERT_NEAR(compute_ratio(low_m) / bound, fraction, 1e-3);
-    const Shape shape = compute_shape();
-    const double survey_sd_m = std::sqrt(shape.sum_squares_m2({lamp}) / 10);
-    const MapErrors found = detect();
-    ASSERT_THAT(found.offsets, SizeIs(8));
-    if (fraction < 1) {
-      EXPECT_THAT(found.errors, IsEmpty());
-      continue;
-    }
-    ASSERT_THAT(found.errors, SizeIs(1)) << describe_map_errors(found.errors);
-    EXPECT_THAT(found.errors[0].lamps, ElementsAre(7));
-    const double sd_m = survey_sd_m / std::sqrt(shape.projector(2 * lamp, 2 * lamp));
-    EXPECT_THAT(found.errors[0].sd_m, IsNear(Eigen::Vector3d(sd_m, sd_m, 0), 0.01 * sd_m));
-  }
 }
 
 TEST_F(DetectLampErrorsAtLimits, ReportsFewerThanHalfOfTheLampsAsMoved) {
@@ -461,17 +313,6 @@ TEST_F(DetectUnsteadyLamp, IsReportedInMoreThanTenPercentOfCaptures) {
   EXPECT_EQ(found.errors[0].captures, 20);
 }
 
-TEST_F(DetectUnsteadyLamp, IsReportedInTwoOfNineteenCapturesButNotInOne) {
-  frames.pop_back();
-  frames[0].detections[3].pixel.x() += 60;
-  EXPECT_THAT(detect().errors, IsEmpty());
-  frames[5].detections[3].pixel.y() += 60;
-  const MapErrors found = detect();
-  ASSERT_THAT(found.errors, SizeIs(1));
-  EXPECT_EQ(found.errors[0].contradicting_captures, 2);
-  EXPECT_EQ(found.errors[0].captures, 19);
-}
-
 TEST_F(DetectUnsteadyLamp, IsReportedOnlyWithMostOfTheOutliers) {
   confuse(3, 4);
   const std::vector<Frame> before = frames;
@@ -503,34 +344,6 @@ TEST_F(DetectUnsteadyLamp, IsReportedIfOutliersExceedSurveyErrorsAndSmallestOffs
   EXPECT_NEAR(median_m / (median_px / 521 * kMeanHeight_m), 1, 0.01);
 }
 
-/// Two lamps at a distance for which chi-squared of the map with both swapped is near its bound.
-TEST_F(DetectLampErrorsAtLimits, SwappedLampsAreReportedFromChiSquaredBoundOn) {
-  constexpr double sd_m = 1e-3;
-  const double bound = -2 * std::log(0.01 / (1 + 8 * 7 / 2));
-  for (const double fraction : {0.97, 1.03}) {
-    double distance_m = 5e-3;
-    for (int iteration = 0; iteration < 3; ++iteration) {
-      rig.map.lamps[5].position_m =
-          rig.map.lamps[7].position_m + distance_m * Eigen::Vector3d(0.8, -0.6, 0);
-      map = rig.map;
-      set_survey_sd(sd_m);
-      std::swap(place(5), place(7));
-      const double chi_squared = compute_shape().displacement_m.squaredNorm() / (sd_m * sd_m);
-      if (iteration < 2) distance_m *= std::sqrt(fraction * bound / chi_squared);
-    }
-    take_captures(12);
-    const MapErrors found = detect();
-    const bool is_swapped = !found.errors.empty() && found.errors[0].kind == MapErrorKind::swapped;
-    EXPECT_EQ(is_swapped, fraction > 1);
-    if (fraction > 1) {
-      ASSERT_THAT(found.errors, SizeIs(1));
-      EXPECT_THAT(found.errors[0].lamps, ElementsAre(6, 8));
-      EXPECT_TRUE(found.is_lamp_map_unusable());
-      EXPECT_THAT(found.offsets, SizeIs(8));
-    }
-  }
-}
-
 /// A parallelogram with two opposite corners swapped is the parallelogram with the other two
 /// swapped, turned by half a turn.
 TEST_F(DetectLampErrorsAtLimits, SwappedLampsAreNotNamedIfAnotherPairFitsAsWell) {
@@ -546,83 +359,6 @@ TEST_F(DetectLampErrorsAtLimits, SwappedLampsAreNotNamedIfAnotherPairFitsAsWell)
     const bool is_swapped = !found.errors.empty() && found.errors[0].kind == MapErrorKind::swapped;
     EXPECT_EQ(is_swapped, !is_parallelogram) << describe_map_errors(found.errors);
     EXPECT_EQ(found.is_lamp_map_unusable(), !is_parallelogram);
-  }
-}
-
-/// The map is mirrored, not swapped, if its size of displacements is at most twice as large. The
-/// fifth lamp is near a diagonal of the square, on which a mirror image is a swap of two corners.
-TEST_F(DetectLampErrorsAtLimits, MapIsMirroredUnlessSwappedLampsFitTwiceAsWell) {
-  const auto compute_ratio = [&](double from_diagonal_m) {
-    rig.map = make_lamp_map({{-0.5, -0.5, 1.6},
-                             {0.5, -0.5, 1.6},
-                             {0.5, 0.5, 1.6},
-                             {-0.5, 0.5, 1.6},
-                             {0.25, -0.25 + from_diagonal_m, 1.6}});
-    LampMap swapped = rig.map;
-    for (std::size_t i = 0; i < 5; ++i) {
-      const double n = static_cast<double>(i);
-      swapped.lamps[i].position_m +=
-          2e-3 * Eigen::Vector3d(std::sin(9 * n + 1), std::cos(7 * n), 0);
-    }
-    map = swapped;
-    std::swap(place(0), place(2));
-    LampMap mirrored = map;
-    for (Lamp& lamp : mirrored.lamps) lamp.position_m.y() *= -1;
-    return compute_shape(mirrored).displacement_m.norm() /
-           compute_shape(swapped).displacement_m.norm();
-  };
-  for (const double ratio : {1.94, 2.06}) {
-    double low_m = 0, high_m = 0.05;
-    ASSERT_LT(compute_ratio(low_m), ratio);
-    ASSERT_GT(compute_ratio(high_m), ratio);
-    for (int iteration = 0; iteration < 40; ++iteration) {
-      const double middle_m = (low_m + high_m) / 2;
-      (compute_ratio(middle_m) < ratio ? low_m : high_m) = middle_m;
-    }
-    compute_ratio(low_m);
-    take_captures(12);
-    const MapErrors found = detect();
-    ASSERT_THAT(found.errors, SizeIs(1)) << describe_map_errors(found.errors);
-    EXPECT_EQ(found.errors[0].kind, ratio < 2 ? MapErrorKind::mirrored : MapErrorKind::swapped);
-  }
-}
-
-/// Displacements of all lamps by 10 % of the size of the map.
-TEST_F(DetectLampErrorsAtLimits, MapIsOfOtherRoomIfDisplacementsExceedTenPercent) {
-  origin_m = {12, -7, 0};
-  for (Lamp& lamp : rig.map.lamps) lamp.position_m += origin_m;
-  map = rig.map;
-  take_captures(12);
-  for (const double fraction : {0.97, 1.03}) {
-    double size_m = 0.1;
-    for (int iteration = 0; iteration < 20; ++iteration) {
-      double squares_m2 = 0;
-      for (std::size_t i = 0; i < 8; ++i) {
-        const double n = static_cast<double>(i);
-        place(i) = rig.map.lamps[i].position_m +
-                   size_m * Eigen::Vector3d(std::sin(9 * n + 1), std::cos(7 * n), 0);
-      }
-      Eigen::Vector2d mean_m(0, 0), product_m2(0, 0);
-      for (const Lamp& lamp : map.lamps) mean_m += lamp.position_m.head<2>() / 8;
-      for (std::size_t i = 0; i < 8; ++i) {
-        const Eigen::Vector2d p = place(i).head<2>() - mean_m;
-        squares_m2 += p.squaredNorm();
-        product_m2 += conjugate_product(p, rig.map.lamps[i].position_m.head<2>());
-      }
-      // Similarity from the map to the room.
-      const double scale = product_m2.norm() / squares_m2;
-      const double ratio = compute_shape().displacement_m.norm() / (scale * std::sqrt(squares_m2));
-      size_m *= 0.1 * fraction / ratio;
-    }
-    const MapErrors found = detect();
-    ASSERT_THAT(found.offsets, SizeIs(8));
-    if (fraction < 1) {
-      EXPECT_THAT(found.errors, IsEmpty()) << describe_map_errors(found.errors);
-    } else {
-      ASSERT_THAT(found.errors, SizeIs(1)) << describe_map_errors(found.errors);
-      EXPECT_EQ(found.errors[0].kind, MapErrorKind::other_room);
-      EXPECT_FALSE(found.is_lamp_map_unusable());
-    }
   }
 }
 

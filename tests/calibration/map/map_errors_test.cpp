@@ -13,7 +13,7 @@
 namespace vlp {
 namespace {
 
-using testing::HasSubstr;
+using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
@@ -34,6 +34,11 @@ class DetectMisplacedOrSwappedLamps : public testing::Test {
     return detect_misplaced_or_swapped_lamps(frames, map, extract_camera()).errors;
   }
   std::string found() const { return describe_map_errors(errors()); }
+  std::vector<MapErrorKind> kinds() const {
+    std::vector<MapErrorKind> kinds;
+    for (const MapError& error : errors()) kinds.push_back(error.kind);
+    return kinds;
+  }
   std::vector<Frame> noisy_drive() {
     std::vector<Frame> noisy = drive(rig, 20, random, 0.1);
     for (Frame& frame : noisy) frame.detections = with_noise(frame.detections, random);
@@ -75,8 +80,6 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReturnsOffsetOfOneMovedLampForTiltedCamera
     EXPECT_EQ(describe_map_errors(leveled.errors), found()) << "with the tilt in the calibration";
     EXPECT_THAT(leveled.offsets, SizeIs(map.lamps.size()));
   }
-  EXPECT_THAT(found(),
-              testing::StartsWith("lamp 8 hangs 30 mm from where the map has it (x +30 mm"));
 }
 
 TEST_F(DetectMisplacedOrSwappedLamps, ReturnsThreeDisplacedLampsOfEight) {
@@ -122,7 +125,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReportsOnlyTheLampOfWrongHeight) {
 
 /// In a large room each capture contains few of the lamps.
 TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLargeRoom) {
-  constexpr int rows = 10;
+  constexpr int rows = 5;
   constexpr double distance_m = 1.2, height_m = 2.5, reach_m = 1.9;
   map.lamps.clear();
   for (int i = 0; i < rows * rows; ++i) {
@@ -133,7 +136,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLargeRoom) {
   }
   const Lens lens(rig.calibration.camera.lens_model, rig.calibration.camera.intrinsics);
   frames.clear();
-  for (int i = 0; i < 500; ++i) {
+  for (int i = 0; i < 120; ++i) {
     const Eigen::Vector3d camera_m(random.uniform(0, (rows - 1) * distance_m),
                                    random.uniform(0, (rows - 1) * distance_m), 0);
     Frame frame{std::to_string(i), {}};
@@ -146,12 +149,12 @@ TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLargeRoom) {
   }
   EXPECT_EQ(found(), "");
   for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
-  EXPECT_THAT(found(), HasSubstr("the lamp map seems to be mirrored"));
+  EXPECT_THAT(kinds(), ElementsAre(MapErrorKind::mirrored));
   for (Lamp& lamp : map.lamps) {
     lamp.position_m.x() = random.uniform(0, rows * distance_m);
     lamp.position_m.y() = random.uniform(0, rows * distance_m);
   }
-  EXPECT_THAT(found(), HasSubstr("most captures contradict the lamp map"));
+  EXPECT_THAT(kinds(), ElementsAre(MapErrorKind::other_room));
 }
 
 TEST_F(DetectMisplacedOrSwappedLamps, ReportsErrorsForAtMostTenOf400CorrectMaps) {
@@ -199,15 +202,16 @@ TEST_F(DetectMisplacedOrSwappedLamps, OffsetSdsMatchErrorsOfReportedOffsets) {
 
 TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMap) {
   for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
-  EXPECT_THAT(found(), HasSubstr("seems to be mirrored"));
+  EXPECT_THAT(kinds(), ElementsAre(MapErrorKind::mirrored));
 }
 
 TEST_F(DetectMisplacedOrSwappedLamps, NamesBothSwappedLampsOfEight) {
   for (const auto& [first, second] : {std::pair(2, 4), std::pair(0, 7)}) {
     map = rig.map;
     std::swap(place(static_cast<std::size_t>(first)), place(static_cast<std::size_t>(second)));
-    EXPECT_THAT(found(), HasSubstr("lamps " + std::to_string(first + 1) + " and " +
-                                   std::to_string(second + 1) + " seem to be swapped"));
+    const auto swapped = errors();
+    ASSERT_THAT(kinds(), ElementsAre(MapErrorKind::swapped));
+    EXPECT_THAT(swapped[0].lamps, ElementsAre(first + 1, second + 1));
   }
 }
 
@@ -217,7 +221,8 @@ TEST_F(DetectMisplacedOrSwappedLamps, NamesBothSwappedLampsOfFour) {
       0.5;  // a rectangle's mirror image is an exchange of its corners
   use_lamps(4);
   std::swap(place(0), place(2));
-  EXPECT_THAT(found(), HasSubstr("lamps 1 and 3 seem to be swapped"));
+  ASSERT_THAT(kinds(), ElementsAre(MapErrorKind::swapped));
+  EXPECT_THAT(errors()[0].lamps, ElementsAre(1, 3));
 }
 
 /// No similarity takes a square to its mirror image.
@@ -229,7 +234,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLampsInSquare) {
   use_lamps(4);
   EXPECT_THAT(errors(), IsEmpty());
   for (Lamp& lamp : map.lamps) lamp.position_m.x() *= -1;
-  EXPECT_THAT(found(), HasSubstr("seems to be mirrored"));
+  EXPECT_THAT(kinds(), ElementsAre(MapErrorKind::mirrored));
 }
 
 TEST_F(DetectMisplacedOrSwappedLamps, ReportsLampWhoseDetectionsContradictOtherLamps) {
@@ -237,14 +242,16 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReportsLampWhoseDetectionsContradictOtherL
     std::swap(frames[i].detections[0], frames[i].detections.back());
     frames[i].detections.back().pixel += Eigen::Vector2d(i % 2 == 0 ? 60 : -40, 30);
   }
-  EXPECT_THAT(found(), HasSubstr("lamp 1 contradicts the other lamps in 6 of "));
+  ASSERT_THAT(kinds(), ElementsAre(MapErrorKind::inconsistent));
+  EXPECT_THAT(errors()[0].lamps, ElementsAre(1));
+  EXPECT_EQ(errors()[0].contradicting_captures, 6);
 }
 
 TEST_F(DetectMisplacedOrSwappedLamps, ReportsContradictedMapOnlyWhenLampIdsMatch) {
   for (Lamp& lamp : map.lamps) {
     lamp.position_m.head<2>() = Eigen::Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
   }
-  EXPECT_THAT(found(), HasSubstr("most captures contradict the lamp map"));
+  EXPECT_THAT(kinds(), ElementsAre(MapErrorKind::other_room));
   for (Lamp& lamp : map.lamps) lamp.id += 100;
   EXPECT_EQ(found(), "");
   EXPECT_THAT(find_undetected_lamps(frames, map), SizeIs(map.lamps.size()));

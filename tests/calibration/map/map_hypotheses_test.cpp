@@ -290,6 +290,48 @@ TEST_F(ChooseMapError, SwappedLampsAreReportedEvenIfMirroredMapFitsWithinNoise) 
   EXPECT_THAT(found.errors[0].lamps, ElementsAre(6, 7));
 }
 
+/// A square with two opposite corners swapped is its mirror image, and the square with the other
+/// two swapped. A parallelogram has no such mirror image.
+TEST_F(ChooseMapError, EquallyGoodSwapsOfContradictedMapAreNotNamed) {
+  for (const double shear_m : {0.0, 0.2}) {
+    room.map = make_lamp_map({{-0.5, -0.5, 1.6},
+                              {0.5 - shear_m, -0.5, 1.6},
+                              {0.5, 0.5, 1.6},
+                              {-0.5 + shear_m, 0.5, 1.6}});
+    map = room.map;
+    std::swap(place(0), place(2));
+    Random random(5);
+    for (int draw = 0; draw < 8; ++draw) {
+      take_captures(12);
+      for (Frame& frame : frames) {
+        for (Detection& detection : frame.detections) detection.sigma_px = 0.1;
+        frame.detections = with_noise(frame.detections, random);
+      }
+      const MapErrors found = detect();
+      ASSERT_THAT(found.errors, SizeIs(1));
+      EXPECT_EQ(found.errors[0].kind,
+                shear_m == 0 ? MapErrorKind::mirrored : MapErrorKind::other_room)
+          << describe_map_errors(found.errors);
+      if (shear_m == 0) EXPECT_THAT(found.offsets, IsEmpty()) << "contradicted";
+    }
+  }
+}
+
+/// No mirrored map explains captures of a map with two lamps swapped, and no alternative those of
+/// another room.
+TEST_F(ChooseMapError, OtherMapsWhoseAdjustmentFailsAreNotNamed) {
+  std::swap(place(0), place(5));
+  const MapErrors swapped = detect();
+  ASSERT_THAT(swapped.errors, SizeIs(1)) << describe_map_errors(swapped.errors);
+  EXPECT_EQ(swapped.errors[0].kind, MapErrorKind::swapped);
+  EXPECT_THAT(swapped.errors[0].lamps, testing::UnorderedElementsAre(1, 6));
+  for (std::size_t i = 0; i < 8; ++i)
+    place(i) = {std::sin(9. * double(i)), std::cos(7. * double(i)), 1.6};
+  const MapErrors other = detect();
+  ASSERT_THAT(other.errors, SizeIs(1)) << describe_map_errors(other.errors);
+  EXPECT_EQ(other.errors[0].kind, MapErrorKind::other_room);
+}
+
 TEST_F(ChooseMapError, OtherRoomIsNotReportedIfMovedLampExplainsLargeDisplacements) {
   place(2).head<2>() -= Eigen::Vector2d(0.5, 0.3);
   const MapErrors found = detect();
