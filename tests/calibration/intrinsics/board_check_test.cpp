@@ -150,16 +150,6 @@ TEST_P(CheckBoardLayout, ReportsNoProblemForTagsOfSecondBoard) {
   EXPECT_THAT(problem(views_.board), IsEmpty());
 }
 
-/// A column determines the number of columns, but not the direction of the ids in a row.
-TEST_P(CheckBoardLayout, ReportsNoLayoutIfOnlyTagsOfOneColumnAreSeen) {
-  for (BoardView& view : seen_) {
-    std::erase_if(view.detection.tags, [](const TagDetection& tag) { return tag.id % 6 != 2; });
-  }
-  Board board = views_.board;
-  board.cols = 4;
-  EXPECT_THAT(problem(board), HasSubstr("do not lie as on a board of 4 x 5 tags"));
-}
-
 TEST_P(CheckBoardLayout, SuggestsAnotherBoardWhenTagIdsArePermuted) {
   for (BoardView& view : seen_) {
     for (TagDetection& tag : view.detection.tags) tag.id = tag.id * 7 % 30;
@@ -238,50 +228,6 @@ TEST(CheckFlatBoardLayout, NamesEveryIdOrder) {
   }
 }
 
-TEST(CheckFlatBoardLayout, NamesFirstIdOfOtherBoard) {
-  Board truth = small_board();
-  truth.first_id = 7;
-  const auto views = make_flat_views(truth, {{1000, 0.3, 0}, {1500, -2, 0}});
-  EXPECT_EQ(layout_problem(small_board(), views),
-            "the images show cols 4, rows 3, id_order row-major-from-top-left, first_id 7");
-  Board column = truth;
-  column.id_order.column_major = true;
-  EXPECT_EQ(layout_problem(small_board(), make_flat_views(column, {{1000, 0.3, 0}, {1500, -2, 0}})),
-            "the images show cols 4, rows 3, id_order column-major-from-top-left, first_id 7");
-}
-
-TEST(CheckFlatBoardLayout, CountsRowsUpToLastTagSeen) {
-  // Two of three rows are seen; all three are stated.
-  const auto views = make_flat_views(small_board(), {{1000, 0.3, 0}, {1500, -2, 0}},
-                                     [](int id) { return id < 8; });
-  EXPECT_EQ(layout_problem(small_board(), views), "");
-  Board other = small_board();
-  other.id_order.from = BoardCorner::bottom_right;
-  EXPECT_EQ(layout_problem(other, views),
-            "the images show cols 4, rows 3, id_order row-major-from-top-left");
-  Board wide = small_board();
-  wide.cols = 6;
-  wide.rows = 2;
-  EXPECT_EQ(layout_problem(wide, views),
-            "the images show cols 4, rows 2, id_order row-major-from-top-left");
-}
-
-TEST(CheckFlatBoardLayout, NeedsTenStepsBetweenTags) {
-  // n neighboring tags have n (n - 1) steps between them.
-  const auto first = [](int count) { return [count](int id) { return id < count; }; };
-  std::vector<BoardView> views{make_flat_view(small_board(), {}, first(3)),
-                               make_flat_view(small_board(), {}, first(2))};
-  EXPECT_FALSE(check_board_layout(small_board(), views, {}).pitch) << "eight steps";
-  views.push_back(views.back());
-  const BoardCheck ten = check_board_layout(small_board(), views, {});
-  ASSERT_TRUE(ten.pitch);
-  EXPECT_NEAR(*ten.pitch, 1.4, 1e-9);
-  EXPECT_EQ(ten.problem, "");
-  const BoardCheck none = check_board_layout(small_board(), {}, {});
-  EXPECT_FALSE(none.pitch);
-  EXPECT_EQ(none.problem, "");
-}
-
 TEST(CheckFlatBoardLayout, ToleranceOfSpacingIsFivePercentOfPitchOrOneWithLens) {
   const std::array parameters{800.0, 800.0, 1000.0, 1000.0};
   const Lens lens(LensModel::pinhole, parameters);
@@ -349,32 +295,6 @@ TEST(CheckFlatBoardLayout, IgnoresTagsWithoutRaysOrBehindCamera) {
   const auto far = make_flat_views(small_board(), {{1000, 0, 0}, {1000, 0, 0}});
   EXPECT_TRUE(check_board_layout(small_board(), far, {}).pitch);
   EXPECT_FALSE(check_board_layout(small_board(), far, lens).pitch);
-}
-
-TEST(CheckFlatBoardLayout, UsesTagsThatBoardDoesNotHave) {
-  // Rows 3 and 4 of a taller board count as foreign tags.
-  Board tall = small_board();
-  tall.rows = 5;
-  auto views = make_flat_views(tall, {{1000, 0.3, 0}, {1500, -2, 0}});
-  for (BoardView& view : views) {
-    auto& tags = view.detection.tags;
-    const auto foreign = std::stable_partition(tags.begin(), tags.end(),
-                                               [](const TagDetection& tag) { return tag.id < 12; });
-    view.detection.foreign_tags.assign(foreign, tags.end());
-    tags.erase(foreign, tags.end());
-  }
-  EXPECT_EQ(layout_problem(small_board(), views),
-            "the images show cols 4, rows 5, id_order row-major-from-top-left");
-}
-
-TEST(CheckFlatBoardLayout, ReportsOtherBoardForTagsInDisorder) {
-  auto views = make_flat_views(small_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
-  for (BoardView& view : views) {
-    for (TagDetection& tag : view.detection.tags) tag.id = tag.id * 5 % 12;
-  }
-  EXPECT_EQ(layout_problem(small_board(), views),
-            "the tags in the images do not lie as on a board of 4 x 3 tags from id 0 in any "
-            "id_order; is it another board?");
 }
 
 /// ChArUco board of 7 x 5 squares of 30 mm with markers of 22.5 mm.
@@ -456,81 +376,6 @@ TEST(CheckCharucoLayout, NamesColorOfFirstSquareForOddNumberOfColumns) {
                                                   (is_white ? "white" : "black"));
     }
   }
-}
-
-/// Only the stated board has marker 17, which is displaced in each view.
-TEST(CheckCharucoLayout, KeepsColorWhenMarkerThatOppositeColorLacksIsDisplaced) {
-  Board white = charuco_board();
-  white.top_left_white = true;
-  auto views = make_flat_views(white, {{1000, 0, 0}, {1500, 0, 0}});
-  for (BoardView& view : views) {
-    ASSERT_EQ(view.detection.tags.size(), 18U);
-    TagDetection& last = view.detection.tags.back();
-    ASSERT_EQ(last.id, 17);
-    for (auto& corner : last.corners_px) corner.x() -= 100;
-  }
-  EXPECT_EQ(layout_problem(white, views), "");
-}
-
-TEST(CheckCharucoLayout, ReportsOtherBoardForMarkersInDisorder) {
-  auto views = make_flat_views(charuco_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
-  for (BoardView& view : views) {
-    for (TagDetection& tag : view.detection.tags) tag.id = tag.id * 7 % 17;
-  }
-  EXPECT_EQ(layout_problem(charuco_board(), views),
-            "the markers in the images do not lie as on a ChArUco board of 7 x 5 squares from id "
-            "0; is it another board?");
-}
-
-TEST(CheckCharucoLayout, IgnoresMarkersOfSecondBoard) {
-  auto views = make_flat_views(charuco_board(), {{1000, 0, 0}, {1500, 0, 0}});
-  const auto other = make_flat_views(charuco_board(), {{1000, 0, 0}, {1500, 0, 0}},
-                                     [](int id) { return id < 14; });
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    for (TagDetection tag : other[i].detection.tags) {
-      tag.id = 40 + tag.id * 5 % 14;
-      for (auto& corner : tag.corners_px) corner.x() += 700;
-      views[i].detection.foreign_tags.push_back(tag);
-    }
-  }
-  EXPECT_EQ(layout_problem(charuco_board(), views), "");
-}
-
-TEST(CheckFlatBoardLayout, PitchIsThatOfTagsUpToTwoPitchesApart) {
-  Board board = small_board();
-  board.cols = board.rows = 10;
-  for (const int apart : {1, 2, 3}) {
-    const auto views = make_flat_views(board, {{1000, 0.3, 0}, {1500, -2, 0}}, [apart](int id) {
-      return id % 10 % apart == 0 && id / 10 % apart == 0;
-    });
-    const auto pitch = check_board_layout(board, views, {}).pitch;
-    ASSERT_EQ(pitch.has_value(), apart < 3) << apart;
-    if (pitch) EXPECT_NEAR(*pitch, 1.4, 1e-9);
-  }
-}
-
-/// Steps may deviate from the direction on the board by a quarter of their length.
-TEST(CheckFlatBoardLayout, AcceptsTagsThatAreSlightlyOutOfLine) {
-  for (const double shear : {0.24, 0.28}) {
-    auto views = make_flat_views(small_board(), {{1000, 0, 0}, {1500, 0, 0}});
-    for (BoardView& view : views) {
-      for (TagDetection& tag : view.detection.tags) {
-        const double down_px = shear * (tag.corners_px[0].x() - 900);
-        for (auto& corner : tag.corners_px) corner.y() += down_px;
-      }
-    }
-    EXPECT_EQ(layout_problem(small_board(), views).empty(), shear < 0.25) << shear;
-  }
-}
-
-TEST(CheckCharucoLayout, NamesRowsIfMostMarkersAreUnknown) {
-  // 14 of 31 markers are known, and two fifths of the steps.
-  Board tall = charuco_board();
-  tall.rows = 9;
-  const auto views = make_flat_views(tall, {{1000, 0.3, 0}, {1500, -2, 0}});
-  Board stated = charuco_board();
-  stated.rows = 4;
-  EXPECT_EQ(layout_problem(stated, views), "the images show cols 7, rows 9, top_left black");
 }
 
 TEST(CheckCharucoLayout, KeepsStatedRowsIfFewerAreSeen) {

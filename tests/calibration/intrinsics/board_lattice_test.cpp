@@ -4,11 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <stdexcept>
-#include <vector>
 
 #include "calibration/intrinsics/synthetic_views.h"
 
@@ -104,16 +102,6 @@ TEST(BoardLattice, DimensionsOfBoardInFourParts) {
   EXPECT_EQ(lattice.find_tag_index_of_point(7), 7U);
 }
 
-TEST(BoardLattice, DimensionsOfBoardOfSquares) {
-  const BoardLattice lattice(squares_board());
-  EXPECT_EQ(lattice.num_board_parts(), 1U);
-  EXPECT_EQ(lattice.lattice_cols(), 7);
-  EXPECT_EQ(lattice.lattice_rows(), 5);
-  EXPECT_DOUBLE_EQ(lattice.point_spacing_m(), 0.03);
-  EXPECT_EQ(lattice.board_to_part_warp_ratio(), Eigen::Vector2d(1, 1));
-  EXPECT_EQ(lattice.find_tag_index_of_point(9), 9U);
-}
-
 TEST(BoardLattice, ThrowsForSingleRowOrColumnOfSpacedTags) {
   Board row = spaced_board(), column = spaced_board();
   row.rows = 1;
@@ -169,28 +157,6 @@ TEST(BoardLattice, ListsCornersOfTagsOfBoardInOnePart) {
   }
 }
 
-TEST(BoardLattice, ListsCornersOfTagsOfBoardInFourParts) {
-  Board board = spaced_board();
-  board.corner_squares = false;
-  const BoardLattice lattice(board);
-  // Ids along columns of three: id 12 is at column 1, row 2.
-  const TagDetection tag = make_tag_with_all_fields(12, {{{10, 90}, {50, 90}, {50, 20}, {10, 20}}});
-  const auto corners = lattice.list_corners_with_board_positions({{tag}});
-  ASSERT_EQ(corners.size(), 4U);
-  const std::array<Eigen::Vector3d, 4> positions_m{
-      {{0.025, 0.07, 0}, {0.045, 0.07, 0}, {0.045, 0.05, 0}, {0.025, 0.05, 0}}};
-  for (std::size_t k = 0; k < 4; ++k) {
-    EXPECT_EQ(corners[k].part, k);
-    EXPECT_EQ(corners[k].point, 2U * 4 + 1);
-    EXPECT_LT((corners[k].in_board_m - positions_m[k]).norm(), 1e-12);
-    EXPECT_GT(corners[k].d_pixel_d_edge_shift.norm(), 1);
-  }
-  board.corner_squares = true;
-  for (const auto& corner : BoardLattice(board).list_corners_with_board_positions({{tag}})) {
-    EXPECT_EQ(corner.d_pixel_d_edge_shift, Eigen::Vector2d::Zero()) << "squares touch the corner";
-  }
-}
-
 TEST(BoardLattice, InwardDisplacementMovesBothEdgesOfObliqueTagByOnePixel) {
   // Both directions of rotation, and no right angles.
   const TagDetection::Corners corners_px{{{12, 95}, {60, 80}, {75, 15}, {5, 30}}};
@@ -217,15 +183,6 @@ TEST(BoardLattice, InwardDisplacementMovesBothEdgesOfObliqueTagByOnePixel) {
   }
 }
 
-TEST(BoardLattice, InwardDisplacementIsZeroForTagOnLine) {
-  const TagDetection tag{0, {{{10, 10}, {20, 10}, {30, 10}, {40, 10}}}};
-  const auto corners =
-      BoardLattice(synthetic_board(false)).list_corners_with_board_positions({{tag}});
-  ASSERT_EQ(corners.size(), 4U);
-  for (const auto& corner : corners)
-    EXPECT_EQ(corner.d_pixel_d_edge_shift, Eigen::Vector2d::Zero());
-}
-
 TEST(BoardLattice, ListsPointsOfBoardOfSquares) {
   const BoardLattice lattice(squares_board());
   BoardDetection seen;
@@ -241,97 +198,6 @@ TEST(BoardLattice, ListsPointsOfBoardOfSquares) {
   EXPECT_EQ(corners[0].d_pixel_d_edge_shift, Eigen::Vector2d::Zero());
   EXPECT_LT((corners[1].in_board_m - Eigen::Vector3d(0.18, 0.12, 0)).norm(), 1e-12);
   EXPECT_EQ(corners[1].weight, 1);
-}
-
-TEST(BoardLattice, ListsPointsOfPartsAtOriginsOfParts) {
-  const BoardLattice lattice(spaced_board());
-  // Corners of a tag: bottom left, bottom right, top right, top left.
-  const std::array<Eigen::Vector3d, 4> origins_m{
-      {{0, 0.02, 0}, {0.02, 0.02, 0}, {0.02, 0, 0}, {0, 0, 0}}};
-  BoardDetection seen;
-  for (std::size_t part = 0; part < 4; ++part) {
-    seen.points.push_back({lattice.point_index_on_board(part, 6), {1, 2}});
-  }
-  const auto corners = lattice.list_corners_with_board_positions(seen);
-  ASSERT_EQ(corners.size(), 4U);
-  const BoardPose pose{{0.3, -0.2, 0.5}, {1, 2, 3}};
-  const Eigen::Vector3d axis = pose.rotation.normalized();
-  const Eigen::Quaterniond turn(Eigen::AngleAxisd(pose.rotation.norm(), axis));
-  for (std::size_t part = 0; part < 4; ++part) {
-    EXPECT_EQ(corners[part].part, part);
-    EXPECT_EQ(corners[part].point, 6U);
-    const Eigen::Vector3d node_m(0.05, 0.025, 0);  // column 2, row 1
-    EXPECT_LT((corners[part].in_board_m - origins_m[part] - node_m).norm(), 1e-12);
-
-    const BoardPose of_part = lattice.compute_board_part_pose(pose, part);
-    EXPECT_EQ(of_part.rotation, pose.rotation);
-    EXPECT_LT((of_part.translation_m - pose.translation_m - turn * origins_m[part]).norm(), 1e-12);
-  }
-}
-
-TEST(BoardLattice, WarpOfWholeBoardIsThatOfPartsTimesRatio) {
-  const BoardLattice lattice(spaced_board());
-  std::vector<BoardLattice::Corner> corners(4);
-  corners[0].in_board_m = {0.0475, 0.035, 9};  // middle
-  corners[1].in_board_m = {0, 0.07, 9};
-  corners[2].in_board_m = {0.095 / 4, 0.07, 9};
-  corners[3].in_board_m = {0, 0.07 * 3 / 4, 9};
-  const auto warped = lattice.apply_warp_to_board_corners(corners, {0.001, 0.002});
-  ASSERT_EQ(warped.size(), 4U);
-  const double x_m = 0.001 * std::pow(95 / 75.0, 2), y_m = 0.002 * std::pow(70 / 50.0, 2);
-  EXPECT_NEAR(warped[0].in_board_m.z(), x_m + y_m, 1e-12);
-  EXPECT_NEAR(warped[1].in_board_m.z(), 0, 1e-12);
-  EXPECT_NEAR(warped[2].in_board_m.z(), 0.75 * x_m, 1e-12);
-  EXPECT_NEAR(warped[3].in_board_m.z(), 0.75 * y_m, 1e-12);
-  EXPECT_EQ(warped[3].in_board_m.head<2>(), corners[3].in_board_m.head<2>());
-}
-
-/// Returns tags with these ids, and without corners.
-BoardDetection make_tags(const std::vector<int>& ids) {
-  BoardDetection seen;
-  for (const int id : ids) seen.tags.push_back({id, {}});
-  return seen;
-}
-
-TEST(BoardLattice, ThreeTagsDeterminePoseOfBoardInOnePart) {
-  const BoardLattice lattice(synthetic_board(false));
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(make_tags({3, 4, 5})));
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(make_tags({3, 4})));
-}
-
-TEST(BoardLattice, SixTagsInTwoRowsAndColumnsDeterminePoseOfBoardInFourParts) {
-  // 6 x 5 tags, ids along rows; and 4 x 6 tags, ids along columns.
-  const BoardLattice lattice(synthetic_board(true));
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(make_tags({0, 1, 2, 3, 4, 6})));
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(make_tags({0, 6, 12, 18, 24, 1})));
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(make_tags({0, 1, 2, 3, 6})));
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(make_tags({0, 1, 2, 3, 4, 5})));
-  Board tall = spaced_board();
-  tall.rows = 6;
-  tall.first_id = 0;
-  EXPECT_FALSE(BoardLattice(tall).are_corners_sufficient_for_pose(make_tags({0, 1, 2, 3, 4, 5})));
-}
-
-TEST(BoardLattice, AllPointsOfSmallBoardOfSquaresDeterminePose) {
-  Board board = squares_board();
-  board.cols = 4;
-  board.rows = 4;
-  const BoardLattice lattice(board);
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(make_points_of_part(lattice, 0, 3, 3)));
-  BoardDetection eight = make_points_of_part(lattice, 0, 3, 3);
-  eight.points.pop_back();
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(eight));
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose({})) << "without points or tags";
-}
-
-TEST(BoardLattice, RowsNeedTwoPointsEach) {
-  const BoardLattice lattice(synthetic_board(false));
-  BoardDetection seen = make_points_of_part(lattice, 0, 11, 1);
-  seen.points.push_back({12, {0, 10}});  // a second row of one point
-  EXPECT_EQ(seen.points.size(), 12U);
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(seen));
-  seen.points.push_back({13, {10, 10}});
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(seen));
 }
 
 }  // namespace

@@ -5,10 +5,8 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <vector>
 
 #include "calibration/intrinsics/intrinsics.h"
 #include "calibration/intrinsics/rotation_vector.h"
@@ -81,20 +79,6 @@ TEST(SolveBoardProblemByCeres, RegularizesDistortionsLikeMrcal) {
   ASSERT_EQ(by_ceres.intrinsics.size(), by_mrcal.intrinsics.size());
   for (std::size_t i = 0; i < by_mrcal.intrinsics.size(); ++i)
     EXPECT_NEAR(by_ceres.intrinsics[i], by_mrcal.intrinsics[i], i < 4 ? 0.01 : 0.001) << i;
-}
-
-/// mrcal also solves for points behind the camera, Ceres only if the lens projects all points.
-TEST(SolveIntermediateBoardProblem, SolvesByMrcalIfLensCannotProjectAllPoints) {
-  BoardProblem start = make_problem_beside_minimum(LensModel::opencv8, 8);
-  ASSERT_FALSE(start.intrinsics.empty());
-  start.poses[0].translation_m.z() *= -1;
-  BoardProblem by_ceres = start, intermediate = start, by_mrcal = start;
-  ASSERT_FALSE(solve_board_problem_by_ceres(by_ceres, kLens));
-  EXPECT_EQ(by_ceres.intrinsics, start.intrinsics);
-  EXPECT_EQ(solve_intermediate_board_problem(intermediate, kLens),
-            solve_board_problem(by_mrcal, kLens));
-  EXPECT_EQ(intermediate.intrinsics, by_mrcal.intrinsics);
-  EXPECT_NE(intermediate.intrinsics, start.intrinsics);
 }
 
 /// Returns the position of a lattice point on the warped board, m (BoardProblem).
@@ -192,124 +176,6 @@ TEST(SolveBoardProblem, KeepsParametersThatAreNotSolved) {
   EXPECT_GT(compute_max_residual_difference_px(flat, truth), 0.01);
 }
 
-TEST(SolveBoardProblem, ReturnsTrueParametersOfModelWithoutDistortions) {
-  const BoardProblem truth = make_exact_problem(LensModel::stereographic);
-  for (const bool by_ceres : {false, true}) {
-    BoardProblem problem = perturb(truth, false, true);
-    const SolveOptions options{true, true, true, false};
-    ASSERT_TRUE(by_ceres ? solve_board_problem_by_ceres(problem, options)
-                         : solve_board_problem(problem, options));
-    expect_same_parameters(problem, truth, 1e-4);
-  }
-}
-
-TEST(SolveIntermediateBoardProblem, ReturnsTrueParametersAndMarksNoOutliers) {
-  const BoardProblem truth = make_exact_problem();
-  BoardProblem problem = perturb(truth, true, true);
-  ASSERT_TRUE(solve_intermediate_board_problem(problem, {true, true, true, false}));
-  expect_same_parameters(problem, truth, 1e-6);
-  problem.points[7].x() += 50;
-  ASSERT_TRUE(solve_intermediate_board_problem(problem, {true, true, true, true}));
-  EXPECT_TRUE(std::ranges::all_of(problem.points, [](const auto& point) { return point.z() > 0; }));
-}
-
-TEST(SolveBoardProblem, IgnoresOutliersAndPointsNotSeen) {
-  const BoardProblem truth = make_exact_problem();
-  BoardProblem problem = perturb(truth, true, true);
-  for (std::size_t i = 0; i < problem.points.size(); i += 7)
-    problem.points[i] << 1, 2, i % 2 == 0 ? -1 : BoardProblem::kUnseen;
-  ASSERT_TRUE(solve_board_problem(problem, {true, true, true, false}));
-  expect_same_parameters(problem, truth, 1e-7);
-}
-
-/// One board has 6 pose parameters, the lens has 8 intrinsics: 7 points give 14 residuals.
-TEST(SolveBoardProblem, FailsWithFewerResidualsThanUnknowns) {
-  BoardProblem problem = make_exact_problem();
-  problem.poses.resize(1);
-  problem.points.resize(problem.num_points_per_board());
-  const std::array<std::size_t, 7> kept{0, 9, 34, 46, 57, 70, 79};
-  for (std::size_t i = 0; i < problem.points.size(); ++i) {
-    if (std::ranges::find(kept, i) == kept.end()) problem.points[i].z() = BoardProblem::kUnseen;
-  }
-  BoardProblem fewer = problem;
-  fewer.points[34].z() = -1;
-  EXPECT_TRUE(solve_board_problem(problem, kLens));
-  EXPECT_FALSE(solve_board_problem(fewer, kLens));
-}
-
-TEST(SolveBoardProblem, FailsForBoardWithoutPoints) {
-  BoardProblem problem = make_exact_problem();
-  for (std::size_t i = 80; i < 160; ++i) problem.points[i].z() = BoardProblem::kUnseen;
-  EXPECT_FALSE(solve_board_problem(problem, kLens));
-}
-
-TEST(SolveBoardProblem, FailsForInvalidInitialLens) {
-  for (const std::size_t parameter : {0U, 1U}) {
-    BoardProblem problem = make_exact_problem();
-    problem.intrinsics[parameter] *= -1;
-    EXPECT_FALSE(solve_board_problem(problem, kLens)) << parameter;
-  }
-  BoardProblem problem = make_exact_problem();
-  problem.intrinsics[5] = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE(solve_board_problem(problem, kLens));
-}
-
-/// The mirrored image has an exact solution with a negative focal length, which mrcal returns.
-TEST(SolveBoardProblem, FailsForNegativeFocalLength) {
-  for (const std::size_t axis : {0U, 1U}) {
-    BoardProblem problem = make_exact_problem(LensModel::stereographic);
-    for (Eigen::Vector3d& point : problem.points) {
-      double& coordinate = axis == 0 ? point.x() : point.y();
-      coordinate = 2 * problem.intrinsics[2 + axis] - coordinate;
-    }
-    problem.intrinsics[axis] *= -1;
-    BoardProblem by_mrcal = problem;
-    ASSERT_TRUE(solve_board_problem_by_mrcal(by_mrcal, {true, false, false, false}));
-    ASSERT_LT(by_mrcal.intrinsics[axis], 0);
-    EXPECT_FALSE(solve_board_problem(problem, {true, false, false, false})) << axis;
-  }
-}
-
-/// Weighted residuals are about 0.01 px on each axis, so that five standard deviations are 0.05 px.
-/// The displacement of 0.062 or 0.048 px leaves residuals of about 0.059 or 0.046 px after the
-/// solve.
-TEST(SolveBoardProblemByCeres, RejectsWeightedResidualsBeyondFiveSigmas) {
-  for (const bool is_outlier : {false, true}) {
-    for (const int axis : {0, 1}) {
-      BoardProblem problem = make_exact_problem();
-      Random random(9);
-      for (std::size_t i = 0; i < problem.points.size(); ++i) {
-        const double weight = i % 2 == 0 ? 2 : 0.5;
-        const double x = random.uniform(-1, 1), y = random.uniform(-1, 1);
-        const Eigen::Vector2d signs(x < 0 ? -1 : 1, y < 0 ? -1 : 1);
-        problem.points[i].head<2>() += 0.01 / weight * signs;
-        problem.points[i].z() = weight;
-      }
-      const BoardProblem without = problem;
-      Eigen::Vector3d& displaced = problem.points[101];
-      displaced[axis] = make_exact_problem().points[101][axis] + (is_outlier ? 0.062 : 0.048) / 0.5;
-      ASSERT_TRUE(solve_board_problem_by_ceres(problem, {true, true, true, true}));
-      for (std::size_t i = 0; i < problem.points.size(); ++i) {
-        const bool is_marked = is_outlier && i == 101;
-        EXPECT_EQ(problem.points[i].z(), is_marked ? -0.5 : without.points[i].z()) << i;
-      }
-      if (!is_outlier) continue;
-      // The solution is that without the outlier.
-      BoardProblem removed = without;
-      removed.points[101].z() = BoardProblem::kUnseen;
-      ASSERT_TRUE(solve_board_problem_by_ceres(removed, {true, true, true, false}));
-      expect_same_parameters(problem, removed, 1e-6);
-    }
-  }
-}
-
-TEST(SolveBoardProblemByCeres, KeepsOutliersOnRequest) {
-  BoardProblem problem = make_exact_problem();
-  problem.points[101].x() += 20;
-  ASSERT_TRUE(solve_board_problem_by_ceres(problem, {true, true, true, false}));
-  EXPECT_GT(problem.points[101].z(), 0);
-}
-
 /// Returns a problem with different weights, residuals, an outlier and a point that is not seen.
 BoardProblem make_problem_to_linearize(LensModel model) {
   BoardProblem problem = perturb(make_exact_problem(model), true, false);
@@ -377,25 +243,6 @@ TEST(LinearizeBoardProblemAnalytically, MatchesDifferenceQuotients) {
   }
 }
 
-TEST(LinearizeBoardProblemAnalytically, ScaleIsOneForStateWithoutEffect) {
-  BoardProblem problem = make_exact_problem();
-  for (std::size_t i = 0; i < 80; ++i) problem.points[i].z() = -1;
-  const Linearization at = linearize_board_problem_analytically(problem, kLens);
-  for (Eigen::Index k = 8; k < 14; ++k) EXPECT_EQ(at.scale[k], 1);
-  EXPECT_NE(at.scale[14], 1);
-  EXPECT_TRUE(at.residuals_px.head(160).isZero(0));
-}
-
-/// Points behind a lens of OPENCV8 are not projected.
-TEST(LinearizeBoardProblemAnalytically, OmitsPointsThatLensDoesNotProject) {
-  BoardProblem problem = make_exact_problem(LensModel::opencv8);
-  problem.poses[1].translation_m.z() *= -1;
-  const Linearization at = linearize_board_problem_analytically(problem, kLens);
-  EXPECT_TRUE(at.residuals_px.segment(160, 160).isZero(0));
-  EXPECT_TRUE(Eigen::MatrixXd(at.jacobian_transposed).middleCols(160, 160).isZero(0));
-  EXPECT_GT(Eigen::MatrixXd(at.jacobian_transposed).middleCols(0, 160).norm(), 0);
-}
-
 TEST(LinearizeBoardProblem, MatchesMrcalForOpencv8) {
   const BoardProblem problem = make_problem_to_linearize(LensModel::opencv8);
   const SolveOptions options{true, true, true, false};
@@ -416,21 +263,6 @@ TEST(LinearizeBoardProblem, MatchesMrcalForOpencv8) {
   EXPECT_EQ(linearize_board_problem(make_exact_problem(), options).regularization.size(), 0);
 }
 
-TEST(CollectInlierCornerPixels, ReturnsPixelsWithPositiveWeight) {
-  BoardProblem problem{};
-  problem.points = {{1, 2, 1}, {3, 4, -1}, {5, 6, BoardProblem::kUnseen}, {7, 8, 0.1}, {9, 10, 0}};
-  EXPECT_THAT(collect_inlier_corner_pixels(problem),
-              testing::ElementsAre(Eigen::Vector2d(1, 2), Eigen::Vector2d(7, 8)));
-}
-
-TEST(IsLensModelSupportedByMrcal, ReturnsFalseForFisheyeOnly) {
-  EXPECT_FALSE(is_lens_model_supported_by_mrcal(LensModel::fisheye));
-  for (const LensModel model : {LensModel::pinhole, LensModel::stereographic, LensModel::opencv4,
-                                LensModel::opencv5, LensModel::opencv8, LensModel::opencv12}) {
-    EXPECT_TRUE(is_lens_model_supported_by_mrcal(model)) << lens_model_name(model);
-  }
-}
-
 TEST(ComputeReprojectionResiduals, ReturnsMeasuredMinusProjected) {
   BoardProblem problem = make_exact_problem();
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
@@ -447,38 +279,6 @@ TEST(ComputeReprojectionResiduals, ReturnsMeasuredMinusProjected) {
       EXPECT_THAT(residuals[i], IsNear(Eigen::Vector2d(0.01 * static_cast<double>(i), -0.5), 1e-9));
     }
   }
-}
-
-TEST(ComputeReprojectionResiduals, ReturnsNanForPointsThatLensDoesNotProject) {
-  BoardProblem problem = make_exact_problem(LensModel::opencv8);
-  problem.poses[1].translation_m.z() *= -1;
-  const auto residuals = compute_reprojection_residuals(problem);
-  ASSERT_EQ(residuals.size(), 320U);
-  for (std::size_t i = 0; i < residuals.size(); ++i)
-    EXPECT_EQ(residuals[i].allFinite(), i < 80 || i >= 160) << i;
-}
-
-/// Residuals of 3, 1 and 2 px with weights 1, 2 and 0.5: squares 9 + 4 + 1.
-TEST(IntrinsicsSolution, FitStatisticsAreWeightedRmsPerAxisAndCounts) {
-  IntrinsicsSolution solution{};
-  solution.problem = make_exact_problem();
-  for (Eigen::Vector3d& point : solution.problem.points) point.z() = BoardProblem::kUnseen;
-  auto& points = solution.problem.points;
-  const std::vector<Eigen::Vector3d> exact = make_exact_problem().points;
-  points[5] << exact[5].x() + 3, exact[5].y(), 1;
-  points[90] << exact[90].x() + 0.6, exact[90].y() - 0.8, 2;
-  points[200] << exact[200].x(), exact[200].y() + 2, 0.5;
-  points[201] << exact[201].x(), exact[201].y() + 50, -0.5;
-  points[202] << exact[202].x(), exact[202].y() + 50, -1;
-  solution.corners = solution.outliers = 77;
-  solution.update_lens_fit_statistics();
-  EXPECT_EQ(solution.corners, 3);
-  EXPECT_EQ(solution.outliers, 2);
-  EXPECT_NEAR(solution.rms_px, std::sqrt(14. / 6), 1e-9);
-  for (const std::size_t i : {5U, 90U, 200U}) points[i].z() = BoardProblem::kUnseen;
-  solution.update_lens_fit_statistics();
-  EXPECT_EQ(solution.corners, 0);
-  EXPECT_EQ(solution.rms_px, 0);
 }
 
 }  // namespace

@@ -5,10 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include <algorithm>
 #include <array>
-#include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -125,20 +122,6 @@ TEST(ConvertCameraToLensModel, ThrowsRecommendingFittingGridWhenGridIsTooCoarse)
   expect_other(strip, {3, 4, 4, 30});
 }
 
-TEST_F(ReadCameraOfAnyFormat, RejectsUnknownFormatsAndModels) {
-  EXPECT_THAT(refusal("a: 1\n"), testing::HasSubstr("camera.txt: "));
-  EXPECT_THAT(refusal("[1, 2]\n"), testing::HasSubstr("contains no camera"));
-  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_CAHVOR', 'imagersize': [1, 2] }"),
-              testing::HasSubstr("has lens model LENSMODEL_CAHVOR; the models are"));
-  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [10, 20], "
-                      "'intrinsics': [ 1, 2, 3 ] }"),
-              testing::HasSubstr("takes 4 parameters, not 3"));
-  EXPECT_THAT(refusal("cam0: {camera_model: omni}\n"), testing::HasSubstr("omni is not supported"));
-  std::string skewed = format_opencv_camera(make_camera(LensModel::opencv5));
-  skewed.replace(skewed.find("[520.25, 0,"), 11, "[520.25, 3,");
-  EXPECT_THAT(refusal(skewed), testing::HasSubstr("camera_matrix is skewed"));
-}
-
 /// Comments as in Python: from a # outside strings to the end of the line.
 TEST_F(ReadCameraOfAnyFormat, IgnoresCommentsInCameramodel) {
   const std::string text =
@@ -193,53 +176,6 @@ TEST_F(ReadCameraOfAnyFormat, ReadsCameramodelWithAnyBracketsQuotesAndBlanks) {
   EXPECT_TRUE(read.region.empty());
 }
 
-TEST_F(ReadCameraOfAnyFormat, ReadsKeyInOtherQuotesIfFirstIsNoEntry) {
-  const std::string intrinsics = "\"intrinsics\": [520, 521, 402, 297]";
-  for (const char* const first : {"'a': ['intrinsics'], ", "'intrinsics': 5, ", "'intrinsics', "}) {
-    comes_back(kPinhole,
-               "{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [800, 600], " +
-                   std::string(first) + intrinsics + "}",
-               LensModel::pinhole);
-  }
-}
-
-TEST_F(ReadCameraOfAnyFormat, RejectsCameramodelWithoutEntry) {
-  const std::string size = "[800, 600]", core = "[520, 521, 402, 297]";
-  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': " + core + "}"),
-              testing::EndsWith("camera.txt: lacks 'imagersize'"));
-  EXPECT_THAT(refusal(cameramodel_with(size, "5")), testing::EndsWith("lacks 'intrinsics'"));
-  EXPECT_THAT(refusal(cameramodel_with(size, "[520, 521")),
-              testing::EndsWith("lacks 'intrinsics'"));
-  EXPECT_THAT(refusal("{ 'lensmodel'"), testing::EndsWith("lacks 'lensmodel'"));
-  EXPECT_THAT(refusal("{ 'lensmodel':"), testing::EndsWith("lacks 'lensmodel'"));
-  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL"), testing::EndsWith("lacks 'lensmodel'"));
-  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [800, 600], "
-                      "'optimization_inputs': b'0', 'intrinsics': " +
-                      core + "}"),
-              testing::EndsWith("lacks 'intrinsics'"))
-      << "entries after the inputs of the solve";
-}
-
-TEST_F(ReadCameraOfAnyFormat, IgnoresEntriesOfOptimizationInputsInCameramodel) {
-  comes_back(kPinhole,
-             cameramodel_with("[800, 600]", "[520, 521, 402, 297]",
-                              ", 'optimization_inputs': b'[[', 'valid_intrinsics_region': []"),
-             LensModel::pinhole);
-}
-
-TEST_F(ReadCameraOfAnyFormat, RejectsInvalidImageSizeOfCameramodel) {
-  const std::string core = "[520, 521, 402, 297]";
-  for (const char* const size : {"[800]", "[800, 600, 3]", "[0, 600]", "[800, -1]", "[800, 0.5]",
-                                 "[1048577, 600]", "[800, 1048577]"}) {
-    EXPECT_THAT(refusal(cameramodel_with(size, core)),
-                testing::EndsWith("'imagersize' should be the image's width and height in pixels"))
-        << size;
-  }
-  EXPECT_EQ(refusal(cameramodel_with("[1, 1048576]", core)), "");
-  EXPECT_THAT(refusal(cameramodel_with("[800, x]", core)),
-              testing::EndsWith("'imagersize' should be numbers"));
-}
-
 TEST_F(ReadCameraOfAnyFormat, ReadsOpenOrClosedRegionOfThreePixelsOrMore) {
   const auto with_region = [](const std::string& region) {
     return cameramodel_with("[800, 600]", "[520, 521, 402, 297]",
@@ -259,18 +195,6 @@ TEST_F(ReadCameraOfAnyFormat, ReadsOpenOrClosedRegionOfThreePixelsOrMore) {
   EXPECT_THAT(refusal(with_region("[ ]")),
               testing::EndsWith("'valid_intrinsics_region' is empty, so the lens has no valid "
                                 "region; leave the key out if it is valid in the whole image"));
-}
-
-/// Neither a number sign in a string nor an escaped backslash before a quote changes the entries.
-TEST_F(ReadCameraOfAnyFormat, CommentEndsWithLineAndQuotesEndWithUnescapedQuote) {
-  comes_back(kPinhole,
-             "{ 'a': \"it's #1\", 'b': '\\\\', # 'c\n"
-             "'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [800, #9\n600],\n"
-             "'intrinsics': [520, 521, 402, 297] }\\",
-             LensModel::pinhole);
-  EXPECT_THAT(refusal("{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [800, 600] # "
-                      "'intrinsics': [520, 521, 402, 297] }"),
-              testing::EndsWith("lacks 'intrinsics'"));
 }
 
 /// OpenCV's text of a camera with these distortions, and further lines.
@@ -353,43 +277,6 @@ TEST_F(ReadCameraOfAnyFormat, ReadsKalibrCameraWithAndWithoutDistortions) {
               testing::EndsWith("camera_model omni is not supported; use pinhole"));
 }
 
-TEST_F(ReadCameraOfAnyFormat, RejectsInvalidYamlCameras) {
-  const std::string text = opencv_text("[1, 2, 3, 4]");
-  const auto replaced = [&](const std::string& from, const std::string& to) {
-    return std::string(text).replace(text.find(from), from.size(), to);
-  };
-  EXPECT_THAT(refusal(replaced(", 0, 0, 1]", ", 0, 0]")),
-              testing::EndsWith("camera_matrix should be 3 x 3"));
-  EXPECT_THAT(refusal(replaced("data: [520", "dates: [520")),
-              testing::EndsWith("a list of numbers is missing"));
-  EXPECT_THAT(refusal(replaced("[1, 2, 3, 4]", "5")),
-              testing::EndsWith("a list of numbers is missing"));
-  EXPECT_THAT(refusal(replaced("[1, 2, 3, 4]", "[1, x]")),
-              testing::HasSubstr("contains no supported camera: "));
-  EXPECT_THAT(refusal(replaced("[520", "[-520")),
-              testing::EndsWith("focal length is not positive"));
-  for (const char* const width : {"0", "-3", "1048577"}) {
-    EXPECT_THAT(refusal(replaced("width: 800", std::string("width: ") + width)),
-                testing::EndsWith("the image should be 1 to 1048576 px wide and high, not " +
-                                  std::string(width)));
-  }
-  EXPECT_THAT(refusal(replaced("height: 600", "height: 0")), testing::EndsWith("high, not 0"));
-  EXPECT_EQ(refusal(replaced("width: 800", "width: 1048576")), "");
-  EXPECT_EQ(refusal(replaced("height: 600", "height: 1")), "");
-}
-
-TEST_F(ReadCameraOfAnyFormat, RejectsXmlAndLargeYaml) {
-  EXPECT_THAT(refusal("<?xml version=\"1.0\"?>\n"),
-              testing::EndsWith("is XML, which is not supported; save it as .yaml with OpenCV"));
-  const std::string text = opencv_text("[1, 2, 3, 4]");
-  EXPECT_EQ(refusal("%YAML:1.0\n" + text), "") << "OpenCV's first line";
-  constexpr std::size_t limit = 1 << 20;
-  EXPECT_EQ(refusal(text + "#" + std::string(limit - text.size() - 1, 'a')), "");
-  EXPECT_THAT(refusal(text + "#" + std::string(limit - text.size(), 'a')),
-              testing::EndsWith("a YAML file of a camera is shorter than 1 MiB"));
-  EXPECT_THAT(refusal("a"), testing::EndsWith("contains no camera"));
-}
-
 TEST_F(ReadCameraOfAnyFormat, ReadsCameraAndRegionOfCalibration) {
   Calibration calibration;
   calibration.camera = make_camera(LensModel::opencv8);
@@ -408,86 +295,6 @@ TEST_F(ReadCameraOfAnyFormat, ReadsCameraAndRegionOfCalibration) {
   }
 }
 
-/// Grid of pixels at which convert_camera_to_lens_model() compares both lenses.
-constexpr int kPointsPerRow = 201;
-
-TEST(ConvertCameraToLensModel, ReturnsSameCameraForItsOwnModel) {
-  const FittedCamera same =
-      convert_camera_to_lens_model(make_camera(LensModel::opencv5), LensModel::opencv5);
-  EXPECT_EQ(same.camera.lens_model, LensModel::opencv5);
-  EXPECT_EQ(same.worst_px, 0);
-  EXPECT_EQ(same.common_fraction, 1);
-}
-
-TEST(ConvertCameraToLensModel, FindsParametersOfModelThatIncludesSourceModel) {
-  Camera camera = make_camera(LensModel::opencv4);
-  camera.id = "left";
-  const FittedCamera fitted = convert_camera_to_lens_model(camera, LensModel::opencv5);
-  EXPECT_EQ(fitted.camera.lens_model, LensModel::opencv5);
-  EXPECT_EQ(fitted.camera.id, "left");
-  EXPECT_EQ(fitted.camera.imager_px, camera.imager_px);
-  ASSERT_EQ(fitted.camera.intrinsics.size(), 9U);
-  for (std::size_t i = 0; i < 8; ++i) {
-    EXPECT_NEAR(fitted.camera.intrinsics[i], camera.intrinsics[i], 1e-5) << i;
-  }
-  EXPECT_NEAR(fitted.camera.intrinsics[8], 0, 1e-5);
-}
-
-/// Sum of the squared distances between the pixels of a grid and those to which a lens projects
-/// their rays; infinite if it does not project one.
-double compute_sum_of_squares(const Lens& from, const Lens& to,
-                              const std::array<int, 2>& imager_px) {
-  double sum = 0;
-  for (const auto& pixel : make_regular_pixel_grid(imager_px)) {
-    const auto found = to.project_point(from.unproject_pixel(pixel).value().direction);
-    sum += found ? (*found - pixel).squaredNorm() : std::numeric_limits<double>::infinity();
-  }
-  return sum;
-}
-
-TEST(ConvertCameraToLensModel, MinimizesSquaresAndReportsLargestDistance) {
-  const Camera camera{"camera", {900, 500}, LensModel::pinhole, {510, 490, 420, 260}, {}, {}, {}};
-  const Lens from(camera.lens_model, camera.intrinsics);
-  for (const LensModel model : {LensModel::stereographic, LensModel::fisheye}) {
-    const FittedCamera fitted = convert_camera_to_lens_model(camera, model);
-    EXPECT_EQ(fitted.common_fraction, 1);
-    const auto& parameters = fitted.camera.intrinsics;
-    ASSERT_EQ(parameters.size(), num_lens_parameters(model));
-    const double minimum = compute_sum_of_squares(from, Lens(model, parameters), camera.imager_px);
-    for (std::size_t k = 0; k < parameters.size(); ++k) {
-      for (const double step : {-1.0, 1.0}) {
-        auto changed = parameters;
-        changed[k] += step * (k < 4 ? 0.01 : 1e-4);
-        EXPECT_GT(compute_sum_of_squares(from, Lens(model, changed), camera.imager_px), minimum)
-            << k;
-      }
-    }
-    double worst = 0;
-    for (const auto& pixel : make_regular_pixel_grid(camera.imager_px, kPointsPerRow)) {
-      const auto ray = from.unproject_pixel(pixel);
-      ASSERT_TRUE(ray);
-      const auto found = Lens(model, parameters).project_point(ray->direction);
-      ASSERT_TRUE(found);
-      worst = std::max(worst, (*found - pixel).norm());
-    }
-    EXPECT_NEAR(fitted.worst_px, worst, 1e-9);
-    EXPECT_GT(worst, 1e-3);
-  }
-}
-
-TEST(ConvertCameraToLensModel, CommonFractionIsThatOfPixelsWithRaysOfBothLenses) {
-  // Fisheye without distortion: angles below 90 degrees are within 100 pi / 2 = 157 px.
-  const Camera wide{"camera", {801, 601}, LensModel::fisheye, {100, 100, 400, 300, 0, 0, 0, 0}, {},
-                    {},       {}};
-  const FittedCamera fitted = convert_camera_to_lens_model(wide, LensModel::pinhole);
-  double inside = 0, all = 0;
-  for (const auto& pixel : make_regular_pixel_grid({801, 601}, kPointsPerRow)) {
-    all += 1;
-    if ((pixel - Eigen::Vector2d(400, 300)).norm() < 157.0796) inside += 1;
-  }
-  EXPECT_NEAR(fitted.common_fraction, inside / all, 1e-9);
-}
-
 TEST(ConvertCameraToLensModel, ThrowsIfNoRayIsInFrontOfPinhole) {
   // All pixels are more than 90 degrees from the axis.
   const Camera behind{
@@ -500,6 +307,58 @@ TEST(ConvertCameraToLensModel, ThrowsIfNoRayIsInFrontOfPinhole) {
     message = error.what();
   }
   EXPECT_EQ(message, "LENSMODEL_PINHOLE has no lens near OPENCV_FISHEYE");
+}
+
+TEST_F(ReadCameraOfAnyFormat, RejectsOtherTextsNamingTheEntry) {
+  const std::string core = "[520, 521, 402, 297]", yaml = opencv_text("[1, 2, 3, 4]");
+  const auto replaced = [&](const std::string& from, const std::string& to) {
+    return std::string(yaml).replace(yaml.find(from), from.size(), to);
+  };
+  std::string skewed = format_opencv_camera(make_camera(LensModel::opencv5));
+  skewed.replace(skewed.find("[520.25, 0,"), 11, "[520.25, 3,");
+  constexpr std::size_t limit = 1 << 20;
+  std::vector<std::pair<std::string, std::string>> refusals{
+      {"a", "contains no camera"},
+      {"[1, 2]\n", "contains no camera"},
+      {"<?xml version=\"1.0\"?>\n", "is XML"},
+      {"cam0: {camera_model: omni}\n", "omni"},
+      {"{ 'lensmodel': 'LENSMODEL_CAHVOR', 'imagersize': [1, 2] }", "LENSMODEL_CAHVOR"},
+      {"{ 'lensmodel'", "lacks 'lensmodel'"},
+      {"{ 'lensmodel': 'LENSMODEL", "lacks 'lensmodel'"},
+      {"{ 'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': " + core + "}", "lacks 'imagersize'"},
+      {cameramodel_with("[800, 600]", "5"), "lacks 'intrinsics'"},
+      {cameramodel_with("[800, 600]", "[520, 521"), "lacks 'intrinsics'"},
+      {cameramodel_with("[800, 600]", "[1, 2, 3]"), "4 parameters, not 3"},
+      {"{ 'lensmodel': 'LENSMODEL_PINHOLE', 'imagersize': [800, 600], 'optimization_inputs': "
+       "b'0', 'intrinsics': " +
+           core + "}",
+       "lacks 'intrinsics'"},
+      {cameramodel_with("[800, x]", core), "'imagersize'"},
+      {skewed, "camera_matrix"},
+      {replaced(", 0, 0, 1]", ", 0, 0]"), "camera_matrix"},
+      {replaced("data: [520", "dates: [520"), "a list of numbers is missing"},
+      {replaced("[1, 2, 3, 4]", "5"), "a list of numbers is missing"},
+      {replaced("[1, 2, 3, 4]", "[1, x]"), "contains no supported camera"},
+      {replaced("[520", "[-520"), "focal length"},
+      {yaml + "#" + std::string(limit - yaml.size(), 'a'), "1 MiB"}};
+  for (const char* const size : {"[800]", "[800, 600, 3]", "[0, 600]", "[800, -1]", "[800, 0.5]",
+                                 "[1048577, 600]", "[800, 1048577]"}) {
+    refusals.emplace_back(cameramodel_with(size, core), "'imagersize'");
+  }
+  for (const char* const width : {"0", "-3", "1048577"}) {
+    refusals.emplace_back(replaced("width: 800", std::string("width: ") + width),
+                          std::string("not ") + width);
+  }
+  for (const auto& [text, entry] : refusals) {
+    EXPECT_THAT(refusal(text), testing::HasSubstr("camera.txt")) << text.substr(0, 200);
+    EXPECT_THAT(refusal(text), testing::HasSubstr(entry)) << text.substr(0, 200);
+  }
+  for (const std::string& text :
+       {cameramodel_with("[1, 1048576]", core), replaced("width: 800", "width: 1048576"),
+        replaced("height: 600", "height: 1"), "%YAML:1.0\n" + yaml,
+        yaml + "#" + std::string(limit - yaml.size() - 1, 'a')}) {
+    EXPECT_EQ(refusal(text), "");
+  }
 }
 
 }  // namespace

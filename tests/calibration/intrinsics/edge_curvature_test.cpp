@@ -10,7 +10,6 @@
 #include <array>
 #include <cmath>
 #include <map>
-#include <utility>
 #include <vector>
 
 #include "calibration/intrinsics/synthetic_views.h"
@@ -96,23 +95,6 @@ TEST(CorrectCornersForEdgeCurvature, RemovesCornerErrorsCausedByCurvatureErrors)
     }
     // The corners now have the curvature of the lens.
     EXPECT_LT(correct_corners_for_edge_curvature(tag.seen, synthetic_lens()), 1e-3);
-  }
-}
-
-TEST(CorrectCornersForEdgeCurvature, CorrectsEachOfSeveralTagsLikeOneAlone) {
-  const std::vector<BoardLattice::Corner> unchanged = tag_with_errors({0.1, 0.1, 0.1, 0.1}).seen;
-  std::vector<BoardLattice::Corner> alone = tag_with_errors({0.06, -0.1, 0.03, 0.08}).seen;
-  std::vector<BoardLattice::Corner> all = unchanged;
-  all[3].curvature.reach = 0;  // an edge of the first tag has no measured curvature
-  all.insert(all.end(), alone.begin(), alone.end());
-  all.insert(all.end(), alone.begin(), alone.end());
-  const double displacement_px = correct_corners_for_edge_curvature(alone, synthetic_lens());
-  EXPECT_GT(displacement_px, 0.05);
-  EXPECT_EQ(correct_corners_for_edge_curvature(all, synthetic_lens()), displacement_px);
-  for (std::size_t k = 0; k < 4; ++k) {
-    EXPECT_EQ(all[k].pixel, unchanged[k].pixel);
-    EXPECT_EQ(all[4 + k].pixel, alone[k].pixel);
-    EXPECT_EQ(all[8 + k].pixel, alone[k].pixel);
   }
 }
 
@@ -207,123 +189,6 @@ TEST(CorrectCornersForEdgeCurvature, MovesCornersByLineFittedToCurvature) {
     EXPECT_EQ(corners[k].curvature.reach, reach);
   }
   EXPECT_NEAR(displacement_px, std::hypot(first, second), 1e-9);
-}
-
-TEST(CorrectCornersForEdgeCurvature, ReturnsLargestDisplacementOfCorners) {
-  auto corners = rectangle_with_curvature({0, 0, 1});
-  corners[1].curvature.quadratic_px = 0.3;  // the right edge moves inwards by 0.2 px
-  corners[2].curvature.quadratic_px = 0.6;  // the upper edge moves inwards by 0.4 px
-  EXPECT_NEAR(correct_corners_for_edge_curvature(corners, straight_lens()), std::hypot(0.2, 0.4),
-              1e-9);
-  EXPECT_LT((corners[0].pixel - Eigen::Vector2d(480, 330)).norm(), 1e-9);
-  EXPECT_LT((corners[1].pixel - Eigen::Vector2d(519.8, 330)).norm(), 1e-9);
-  EXPECT_LT((corners[2].pixel - Eigen::Vector2d(519.8, 270.4)).norm(), 1e-9);
-  EXPECT_LT((corners[3].pixel - Eigen::Vector2d(480, 270.4)).norm(), 1e-9);
-}
-
-// Corners move by sqrt(2) 2 q / 3 with reach 1. A quarter of the shorter edge is 10 px.
-TEST(CorrectCornersForEdgeCurvature, KeepsTagIfCornerWouldMoveByQuarterOfEdge) {
-  for (const double sign : {-1.0, 1.0}) {
-    const double limit = sign * 10 / std::sqrt(2) * 3 / 2;
-    auto below = rectangle_with_curvature({0.99 * limit, 0, 1});
-    EXPECT_NEAR(correct_corners_for_edge_curvature(below, straight_lens()), 9.9, 1e-6);
-    auto above = rectangle_with_curvature({1.01 * limit, 0, 1});
-    EXPECT_EQ(correct_corners_for_edge_curvature(above, straight_lens()), 0);
-    EXPECT_EQ(above[0].pixel, Eigen::Vector2d(480, 330));
-    EXPECT_EQ(above[0].curvature.quadratic_px, 1.01 * limit);
-  }
-}
-
-TEST(CorrectCornersForEdgeCurvature, KeepsTagOutsideImageCircleOfFisheye) {
-  // The image circle ends 122 px from its center.
-  const Lens fisheye(LensModel::fisheye,
-                     std::array{100.0, 100.0, 400.0, 300.0, -0.1, 0.0, 0.0, 0.0});
-  auto outside = rectangle_with_curvature({0.1, 0, 1});
-  for (auto& corner : outside) corner.pixel.x() += 10;
-  ASSERT_TRUE(fisheye.unproject_pixel(outside[0].pixel));
-  ASSERT_FALSE(fisheye.unproject_pixel(outside[1].pixel));
-  EXPECT_EQ(correct_corners_for_edge_curvature(outside, fisheye), 0);
-  EXPECT_EQ(outside[3].pixel, Eigen::Vector2d(490, 270));
-  auto inside = rectangle_with_curvature({0.1, 0, 1});
-  for (auto& corner : inside) corner.pixel.x() -= 80;
-  EXPECT_GT(correct_corners_for_edge_curvature(inside, fisheye), 0);
-}
-
-/// Returns the outward distance of the image of a straight line from its chord at w, by bisection.
-double sagitta_by_bisection(const Lens& lens, const Eigen::Vector2d& from,
-                            const Eigen::Vector2d& to, const Eigen::Vector2d& inside, double w) {
-  const Eigen::Vector3d a = lens.unproject_pixel(from).value().direction,
-                        b = lens.unproject_pixel(to).value().direction;
-  const Eigen::Vector2d along = to - from;
-  double low = 0, high = 1;
-  Eigen::Vector2d offset(0, 0);
-  for (int i = 0; i < 60; ++i) {
-    const double middle = (low + high) / 2;
-    offset = lens.project_point((1 - middle) * a + middle * b).value() - from;
-    (2 * along.dot(offset) / along.squaredNorm() - 1 < w ? low : high) = middle;
-  }
-  const auto side = [&](const Eigen::Vector2d& v) { return along.x() * v.y() - along.y() * v.x(); };
-  return (side(inside - from) > 0 ? -1 : 1) * side(offset) / along.norm();
-}
-
-TEST(CorrectCornersForEdgeCurvature, MatchesIntegralsOverEdgesOfDistortedLens) {
-  const Lens lens = synthetic_lens();
-  // Both directions of rotation.
-  for (const bool is_mirrored : {false, true}) {
-    std::vector<BoardLattice::Corner> corners(4);
-    const std::array<Eigen::Vector2d, 4> pixels{{{60, 120}, {158, 131}, {146, 52}, {64, 40}}};
-    const std::array<EdgeCurvature, 4> curvatures{
-        {{0.3, 0.1, 0.8}, {-0.2, 0.2, 0.9}, {0.1, -0.3, 0.7}, {-0.1, -0.15, 1.0}}};
-    for (std::size_t k = 0; k < 4; ++k) {
-      corners[k].pixel = pixels[is_mirrored ? 3 - k : k];
-      corners[k].curvature = curvatures[k];
-    }
-    const auto before = corners;
-    const Eigen::Vector2d inside = (pixels[0] + pixels[1] + pixels[2] + pixels[3]) / 4;
-    // Outward displacements of each edge at both ends: the line fitted to the difference of the
-    // curves.
-    std::array<std::array<double, 2>, 4> ends{};
-    for (std::size_t k = 0; k < 4; ++k) {
-      const auto& [from, to] = std::pair(before[k].pixel, before[(k + 1) % 4].pixel);
-      const double reach = curvatures[k].reach;
-      double sum = 0, moment = 0, squares = 0;
-      constexpr int steps = 400;
-      for (int i = 0; i < steps; ++i) {
-        const double w = reach * (2 * (i + 0.5) / steps - 1);
-        const double seen =
-            curvatures[k].quadratic_px * (w * w - 1) + curvatures[k].cubic_px * (w * w * w - w);
-        const double difference = seen - sagitta_by_bisection(lens, from, to, inside, w);
-        sum += difference;
-        moment += difference * w;
-        squares += w * w;
-      }
-      ends[k] = {sum / steps - moment / squares, sum / steps + moment / squares};
-    }
-    const double displacement_px = correct_corners_for_edge_curvature(corners, lens);
-    double largest = 0;
-    for (std::size_t k = 0; k < 4; ++k) {
-      const Eigen::Vector2d step = corners[k].pixel - before[k].pixel;
-      largest = std::max(largest, step.norm());
-      for (const bool arriving : {false, true}) {
-        const std::size_t edge = arriving ? (k + 3) % 4 : k;
-        const Eigen::Vector2d along =
-            (before[(edge + 1) % 4].pixel - before[edge].pixel).normalized();
-        const double sign =
-            along.x() * (inside - before[k].pixel).y() - along.y() * (inside - before[k].pixel).x();
-        const double outwards = (sign > 0 ? -1 : 1) * (along.x() * step.y() - along.y() * step.x());
-        // The places on the edge are found by three iterations, accurate to 1e-4 px.
-        EXPECT_NEAR(outwards, ends[edge][arriving ? 1 : 0], 3e-4) << k << ' ' << arriving;
-      }
-      for (const double w : {-0.5, 0.0, 0.5}) {
-        EXPECT_NEAR(
-            corners[k].curvature.curve_offset_from_straight_line_px(w),
-            sagitta_by_bisection(lens, before[k].pixel, before[(k + 1) % 4].pixel, inside, w),
-            0.02 * std::abs(corners[k].curvature.quadratic_px))
-            << k << ' ' << w;
-      }
-    }
-    EXPECT_NEAR(displacement_px, largest, 1e-12);
-  }
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <string>
 #include <vector>
 
@@ -86,121 +85,6 @@ TEST(FindViewsInconsistentWithLens, ReturnsViewsDroppedBySolveOnlyIfSeveral) {
   EXPECT_EQ(describe_inconsistent_views(found, image_names()),
             "2 board images do not fit the other 10: 104.png, 107.png; were they taken by another "
             "camera?");
-}
-
-/// Number of points of a view of make_solution(): two boards of 5 x 4 points.
-constexpr std::size_t kPointsPerView = 40;
-
-/// Returns a solution whose view i has residuals of residuals_px[i] at all points, and no outliers.
-IntrinsicsSolution make_solution(const std::vector<double>& residuals_px) {
-  IntrinsicsSolution solution{};
-  BoardProblem& problem = solution.problem;
-  problem.lens_model = LensModel::pinhole;
-  problem.intrinsics = {500, 500, 400, 300};
-  problem.imager_px = {800, 600};
-  problem.cols = 5;
-  problem.rows = 4;
-  problem.spacing_m = 0.02;
-  for (std::size_t view = 0; view < residuals_px.size(); ++view) {
-    solution.views.push_back(10 + view);
-    for (std::size_t board = 0; board < 2; ++board) {
-      problem.poses.push_back({{0.1, 0.2, 0.3}, {0.01, -0.02, 0.5}});
-    }
-  }
-  problem.points.assign(kPointsPerView * residuals_px.size(), {0, 0, 1});
-  const auto projected = compute_reprojection_residuals(problem);
-  for (std::size_t i = 0; i < projected.size(); ++i) {
-    const double residual_px = residuals_px[i / kPointsPerView];
-    problem.points[i].head<2>() = residual_px * Eigen::Vector2d(0.6, -0.8) - projected[i];
-  }
-  return solution;
-}
-
-void mark_outliers(IntrinsicsSolution& solution, std::size_t view, std::size_t count) {
-  for (std::size_t i = 0; i < count; ++i)
-    solution.problem.points[view * kPointsPerView + 7 * i % kPointsPerView].z() = -0.5;
-}
-
-TEST(FindViewsInconsistentWithLens, NeedsThreeTimesTypicalResidual) {
-  IntrinsicsSolution solution = make_solution({0.1, 0.12, 0.38, 0.1, 0.34, 0.1, 0.09, 0.4});
-  for (const std::size_t view : {1U, 2U, 4U, 7U}) mark_outliers(solution, view, 12);
-  const InconsistentViews found = find_views_inconsistent_with_lens(solution);
-  EXPECT_THAT(found.views, testing::ElementsAre(12, 17));
-  EXPECT_EQ(found.num_other_views, 6U);
-  EXPECT_NEAR(found.typical_px, 0.12, 1e-9);
-  EXPECT_NEAR(found.worst_px, 0.4, 1e-9);
-}
-
-TEST(FindViewsInconsistentWithLens, WorstIsLargestMedianOfFoundViews) {
-  IntrinsicsSolution solution = make_solution({0.5, 0.1, 0.4, 0.1, 0.1, 0.1});
-  for (const std::size_t view : {0U, 2U}) mark_outliers(solution, view, 12);
-  const InconsistentViews found = find_views_inconsistent_with_lens(solution);
-  EXPECT_THAT(found.views, testing::ElementsAre(10, 12));
-  EXPECT_NEAR(found.worst_px, 0.5, 1e-9);
-}
-
-TEST(FindViewsInconsistentWithLens, NeedsOutliersOfTenthOfCorners) {
-  IntrinsicsSolution solution = make_solution({0.1, 0.5, 0.1, 0.5, 0.1});
-  mark_outliers(solution, 1, 4);
-  mark_outliers(solution, 3, 3);
-  EXPECT_THAT(find_views_inconsistent_with_lens(solution).views, testing::ElementsAre(11));
-}
-
-/// Half of the points are not seen or not projected: of the other 20, 2 are outliers.
-TEST(FindViewsInconsistentWithLens, CountsOnlyPointsThatAreSeenAndProjected) {
-  IntrinsicsSolution solution = make_solution({0.1, 0.5, 0.1, 0.1, 0.1});
-  mark_outliers(solution, 1, 2);
-  EXPECT_THAT(find_views_inconsistent_with_lens(solution).views, IsEmpty());
-  for (std::size_t i = 20; i < 30; ++i)
-    solution.problem.points[kPointsPerView + i].z() = BoardProblem::kUnseen;
-  for (std::size_t i = 30; i < 40; ++i)
-    solution.problem.points[kPointsPerView + i].x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_THAT(find_views_inconsistent_with_lens(solution).views, testing::ElementsAre(11));
-  for (std::size_t i = 0; i < 40; ++i)
-    solution.problem.points[kPointsPerView + i].z() = BoardProblem::kUnseen;
-  EXPECT_THAT(find_views_inconsistent_with_lens(solution).views, IsEmpty());
-}
-
-TEST(FindViewsInconsistentWithLens, ReturnsNoneIfHalfOfViewsAreFound) {
-  IntrinsicsSolution solution = make_solution({0.1, 0.1, 0.1, 0.5, 0.5});
-  for (const std::size_t view : {3U, 4U}) mark_outliers(solution, view, 12);
-  EXPECT_THAT(find_views_inconsistent_with_lens(solution).views, testing::ElementsAre(13, 14));
-  solution.dropped_views = {{3, 1}};
-  const InconsistentViews found = find_views_inconsistent_with_lens(solution);
-  EXPECT_THAT(found.views, IsEmpty());
-  EXPECT_EQ(found.num_other_views, 0U);
-}
-
-TEST(FindViewsInconsistentWithLens, ReturnsSingleDroppedViewOnlyWithAnotherView) {
-  IntrinsicsSolution solution = make_solution({0.1, 0.1, 0.1, 0.5, 0.1});
-  solution.dropped_views = {{3, 1}};
-  EXPECT_THAT(find_views_inconsistent_with_lens(solution).views, IsEmpty());
-  mark_outliers(solution, 3, 12);
-  const InconsistentViews found = find_views_inconsistent_with_lens(solution);
-  EXPECT_THAT(found.views, testing::ElementsAre(3, 13));
-  EXPECT_EQ(found.num_other_views, 4U);
-  EXPECT_EQ(found.worst_px, std::numeric_limits<double>::infinity());
-}
-
-TEST(DescribeInconsistentViews, StatesResidualsAndSingularForOneView) {
-  EXPECT_EQ(describe_inconsistent_views({{2}, 7, 1.234, 0.1}, image_names()),
-            "1 board image does not fit the other 7: 102.png (residuals up to 1.23 px, the others "
-            "0.10); was it taken by another camera?");
-}
-
-TEST(DescribeInconsistentViews, NamesTwelveImagesAtMost) {
-  InconsistentViews found{{}, 20, INFINITY, 0.1};
-  for (std::size_t view = 0; view < 12; ++view) found.views.push_back(view);
-  const std::string twelve =
-      "100.png, 101.png, 102.png, 103.png, 104.png, 105.png, 106.png, 107.png, 108.png, 109.png, "
-      "110.png, 111.png";
-  EXPECT_EQ(describe_inconsistent_views(found, image_names()),
-            "12 board images do not fit the other 20: " + twelve +
-                "; were they taken by another camera?");
-  found.views.insert(found.views.end(), {12, 13});
-  EXPECT_EQ(describe_inconsistent_views(found, image_names()),
-            "14 board images do not fit the other 20: " + twelve +
-                " and 2 more; were they taken by another camera?");
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 #include <gmock/gmock.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -146,34 +145,6 @@ TEST(DescribeIntrinsicsStatus, StatesCause) {
                   .starts_with("no lens fits the views"));
 }
 
-TEST(SolveFirstStages, DropsViewWithResidualAboveOnePixel) {
-  for (const auto& [size_px, dropped] : {std::pair{0.9, 0U}, {1.15, 1U}}) {
-    IntrinsicsInput input = make_exact_views(8);
-    displace_alternately(input.views[3], size_px, kCols);
-    const auto solution = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
-    ASSERT_TRUE(solution);
-    ASSERT_EQ(solution->dropped_views.size(), dropped) << size_px;
-    ASSERT_EQ(solution->views.size(), 8 - dropped);
-    ASSERT_EQ(solution->problem.poses.size(), 8 - dropped);
-    if (dropped == 0) continue;
-    EXPECT_EQ(solution->dropped_views[0].view, 3U);
-    EXPECT_NEAR(solution->dropped_views[0].rms_px, size_px, 0.05);
-    EXPECT_THAT(solution->views, testing::ElementsAre(0, 1, 2, 4, 5, 6, 7));
-    EXPECT_LT(solution->rms_px, 1e-4);
-  }
-}
-
-TEST(SolveFirstStages, DropsViewWithResidualAboveFourMedians) {
-  for (const auto& [size_px, dropped] : {std::pair{1.8, 0U}, {2.3, 1U}}) {
-    IntrinsicsInput input = make_exact_views(9);
-    for (std::size_t i = 0; i < 9; ++i)
-      displace_alternately(input.views[i], i == 3 ? size_px : 0.5, kCols);
-    const auto solution = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
-    ASSERT_TRUE(solution);
-    EXPECT_EQ(solution->dropped_views.size(), dropped) << size_px;
-  }
-}
-
 /// Views with more than half of the worst residual are dropped first.
 TEST(SolveFirstStages, DropsWorstViewFirst) {
   IntrinsicsInput input = make_exact_views(9);
@@ -208,46 +179,6 @@ TEST(SolveFirstStages, ReinstatesViewsThatFitLensWithoutBadViews) {
     for (const auto& corner : input.views[solution->views[i]])
       EXPECT_EQ(solution->problem.points[i * 120 + corner.point].head<2>(), corner.pixel);
   }
-}
-
-TEST(SolveFirstStages, ReturnsNulloptForTwoViews) {
-  EXPECT_FALSE(InitialSolutions(make_exact_views(2)).solve_first_stages(LensModel::stereographic));
-  EXPECT_TRUE(InitialSolutions(make_exact_views(3)).solve_first_stages(LensModel::stereographic));
-}
-
-TEST(SolveFirstStages, ReturnsNulloptIfOnlyTwoViewsHavePose) {
-  IntrinsicsInput input = make_exact_views(5);
-  input.views[1].clear();
-  input.views[2].clear();
-  const auto three = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
-  ASSERT_TRUE(three);
-  EXPECT_THAT(three->views, testing::ElementsAre(0, 3, 4));
-  input.views[4].clear();
-  EXPECT_FALSE(InitialSolutions(input).solve_first_stages(LensModel::fisheye));
-}
-
-TEST(SolveFirstStages, ReturnsTrueLensAndPosesForExactCorners) {
-  const IntrinsicsInput input = make_exact_views(6);
-  const auto solution = InitialSolutions(input).solve_first_stages(LensModel::fisheye);
-  ASSERT_TRUE(solution);
-  EXPECT_EQ(solution->status, IntrinsicsStatus::ok);
-  EXPECT_EQ(solution->problem.lens_model, LensModel::fisheye);
-  EXPECT_EQ(solution->problem.imager_px, input.imager_px);
-  EXPECT_EQ(solution->problem.cols, 12);
-  EXPECT_EQ(solution->problem.rows, 10);
-  EXPECT_EQ(solution->problem.spacing_m, 0.02);
-  EXPECT_TRUE(solution->solved_parameters.core);
-  EXPECT_TRUE(solution->solved_parameters.distortions);
-  EXPECT_FALSE(solution->solved_parameters.warp);
-  EXPECT_FALSE(solution->solved_parameters.reject_outliers);
-  const std::array expected{290.0, 291.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006};
-  ASSERT_EQ(solution->problem.intrinsics.size(), expected.size());
-  for (std::size_t i = 0; i < expected.size(); ++i)
-    EXPECT_NEAR(solution->problem.intrinsics[i], expected[i], i < 4 ? 1e-3 : 1e-4) << i;
-  int corners = 0;
-  for (const auto& view : input.views) corners += static_cast<int>(view.size());
-  EXPECT_EQ(solution->corners, corners);
-  EXPECT_EQ(solution->outliers, 0);
 }
 
 TEST(SolveIntrinsics, NeedsMoreThanHalfOfViews) {
@@ -289,45 +220,6 @@ TEST(SolveIntrinsics, NeedsBoardNormalsFiveDegreesApart) {
   EXPECT_EQ(solve_intrinsics(make_tilted_views(0.095)).status, IntrinsicsStatus::ok);
 }
 
-/// The warp is kept if it reduces the sum of squares by more than 20 mean squares. Flat and warped
-/// solutions are computed with the other choices.
-TEST(SolveIntrinsics, KeepsWarpOnlyIfItReducesSquaresBy20MeanSquares) {
-  constexpr double noise_px = 0.05;
-  int kept = 0, close = 0;
-  for (int step = 0; step < 4; ++step) {
-    IntrinsicsInput input =
-        make_exact_views(5, fisheye_for_solves(), {1.6e-5 + 1.5e-6 * step, -4e-6});
-    Random random(17);
-    for (auto& view : input.views) {
-      for (auto& corner : view) {
-        const double v = random.normal(), u = random.normal();
-        corner.pixel += noise_px * Eigen::Vector2d(u, v);
-      }
-    }
-    const IntrinsicsSolution flat = solve_intrinsics(input);
-    input.warp = WarpChoice::on;
-    const IntrinsicsSolution with_warp = solve_intrinsics(input);
-    input.warp = WarpChoice::automatic;
-    const IntrinsicsSolution found = solve_intrinsics(input);
-    ASSERT_TRUE(flat.has_succeeded() && with_warp.has_succeeded() && found.has_succeeded());
-    ASSERT_EQ(flat.outliers + with_warp.outliers, 0);
-    EXPECT_FALSE(flat.solved_parameters.warp);
-    EXPECT_EQ(flat.problem.warp_m, Eigen::Vector2d(0, 0));
-    EXPECT_TRUE(with_warp.solved_parameters.warp);
-    EXPECT_NE(with_warp.problem.warp_m, Eigen::Vector2d(0, 0));
-    const double reduction =
-        2 * flat.corners * std::pow(flat.rms_px / with_warp.rms_px, 2) - 2 * with_warp.corners;
-    if (std::abs(reduction - 20) < 3) ++close;
-    if (std::abs(reduction - 20) < 0.01) continue;
-    EXPECT_EQ(found.solved_parameters.warp, reduction > 20) << reduction;
-    EXPECT_EQ(found.problem.warp_m != Eigen::Vector2d(0, 0), reduction > 20) << reduction;
-    if (reduction > 20) ++kept;
-  }
-  EXPECT_GT(kept, 0);
-  EXPECT_LT(kept, 4);
-  EXPECT_GT(close, 0);
-}
-
 TEST(SolveIntrinsics, EstimatesWarpOfExactBoard) {
   const Eigen::Vector2d warp_m(0.0005, -0.0003);
   IntrinsicsInput input = make_exact_views(6, fisheye_for_solves(), warp_m);
@@ -337,64 +229,6 @@ TEST(SolveIntrinsics, EstimatesWarpOfExactBoard) {
   EXPECT_TRUE(solution.solved_parameters.warp);
   EXPECT_THAT(solution.problem.warp_m, IsNear(warp_m, 1e-8));
   EXPECT_LT(solution.rms_px, 1e-5);
-}
-
-/// Returns a solution of noisy views with a displaced corner in view 2.
-IntrinsicsSolution solve_noisy_views(const Board& board, int count, WarpChoice warp) {
-  const SyntheticViews views{board, fisheye_for_solves()};
-  Random random(13);
-  IntrinsicsInput input = views.input(count, random, 0.1);
-  input.warp = warp;
-  input.views[2][5].pixel.x() += 3;
-  return solve_intrinsics(input);
-}
-
-TEST(SolveIntrinsicsFromHalfOfViews, MatchesSolveOfEverySecondView) {
-  for (const bool kalibr : {false, true}) {
-    const IntrinsicsSolution whole =
-        solve_noisy_views(synthetic_board(kalibr), 9, kalibr ? WarpChoice::on : WarpChoice::off);
-    ASSERT_TRUE(whole.has_succeeded());
-    ASSERT_EQ(whole.views.size(), 9U);
-    ASSERT_GE(whole.outliers, 1);
-    const std::size_t parts = kalibr ? 4 : 1;
-    ASSERT_EQ(whole.problem.poses.size(), 9 * parts);
-    for (const std::size_t first : {0U, 1U}) {
-      const IntrinsicsSolution half = solve_intrinsics_from_half_of_views(whole, first);
-      ASSERT_TRUE(half.has_succeeded());
-      IntrinsicsSolution expected = whole;
-      expected.problem.points.clear();
-      expected.problem.poses.clear();
-      std::vector<std::size_t> views;
-      std::vector<double> shifts_px;
-      const std::size_t points_per_view = whole.problem.points.size() / 9;
-      for (std::size_t view = first; view < 9; view += 2) {
-        views.push_back(whole.views[view]);
-        shifts_px.push_back(whole.edge_displacements_px[view]);
-        for (std::size_t part = 0; part < parts; ++part)
-          expected.problem.poses.push_back(whole.problem.poses[view * parts + part]);
-        for (std::size_t i = 0; i < points_per_view; ++i)
-          expected.problem.points.push_back(whole.problem.points[view * points_per_view + i]);
-      }
-      ASSERT_TRUE(solve_board_problem(expected.problem, {true, true, kalibr, false}));
-      expected.update_lens_fit_statistics();
-      EXPECT_EQ(half.views, views);
-      EXPECT_EQ(half.edge_displacements_px, shifts_px);
-      EXPECT_EQ(half.problem.intrinsics, expected.problem.intrinsics);
-      EXPECT_EQ(half.problem.points, expected.problem.points);
-      EXPECT_EQ(half.rms_px, expected.rms_px);
-      EXPECT_EQ(half.corners, expected.corners);
-      EXPECT_EQ(half.outliers, expected.outliers);
-      EXPECT_NE(half.problem.intrinsics, whole.problem.intrinsics);
-    }
-  }
-}
-
-TEST(SolveIntrinsicsFromHalfOfViews, NeedsThreeViews) {
-  const IntrinsicsSolution whole = solve_noisy_views(synthetic_board(false), 5, WarpChoice::off);
-  ASSERT_TRUE(whole.has_succeeded());
-  ASSERT_EQ(whole.views.size(), 5U);
-  EXPECT_TRUE(solve_intrinsics_from_half_of_views(whole, 0).has_succeeded());
-  EXPECT_EQ(solve_intrinsics_from_half_of_views(whole, 1).status, IntrinsicsStatus::too_few_views);
 }
 
 TEST(SolveIntrinsicsFromHalfOfViews, FailsForParallelBoardsAndUnseenPoints) {
@@ -457,17 +291,6 @@ TEST(SolveIntrinsics, KeepsWeightsIfNoSdIsKnown) {
   EXPECT_NEAR(solution.rms_px, 0.05, 0.004);
 }
 
-/// A displaced corner of exact views is an outlier if the RMS residual exceeds 0.005 px.
-TEST(SolveIntrinsics, RejectsOutliersOnlyAboveRmsOfExactCorners) {
-  for (const auto& [size_px, has_outliers] : {std::pair{0.05, false}, {0.5, true}}) {
-    IntrinsicsInput input = make_exact_views(6);
-    input.views[2][7].pixel.x() += size_px;
-    const IntrinsicsSolution solution = solve_intrinsics(input);
-    ASSERT_TRUE(solution.has_succeeded());
-    EXPECT_EQ(solution.outliers > 0, has_outliers) << solution.rms_px;
-  }
-}
-
 /// Splined model that is fast to solve, and a lens up to 58 degrees off the axis.
 constexpr LensModel kSmallSpline = lens_model_for_spline_grid({3, 9, 8, 130});
 Lens lens_of_small_spline() {
@@ -515,15 +338,6 @@ TEST(SolveIntrinsics, SplinedLensKeepsAxisAndSidewaysRaysOfFisheye) {
   EXPECT_LT(Eigen::AngleAxisd(*rotation).angle(), 1.2e-4);
 }
 
-TEST(SolveIntrinsics, SplinedLensHasNoiseOfAtLeastOneHundredthPixel) {
-  IntrinsicsInput input = make_exact_views(10, lens_of_small_spline());
-  input.lens_model = kSmallSpline;
-  const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.has_succeeded());
-  EXPECT_EQ(solution.problem.noise_px, 0.01);
-  EXPECT_LT(solution.rms_px, 0.02);
-}
-
 /// Returns the view and the tag of each outlier of a solution.
 std::vector<std::pair<std::size_t, std::size_t>> list_outlier_tags(
     const IntrinsicsSolution& solution, const BoardLattice& lattice) {
@@ -552,54 +366,6 @@ TEST(SolveFirstStages, MarksTagsWithDisplacedCornerForSplinedLens) {
     }
     EXPECT_EQ(tags.size(), 4U);
     for (const auto& found : tags) EXPECT_EQ(found, std::pair(view, tag));
-  }
-}
-
-/// No corner is marked in a view in which more than a quarter would be.
-TEST(SolveFirstStages, MarksAtMostQuarterOfCornersOfViewForSplinedLens) {
-  IntrinsicsInput exact = make_exact_views(10, lens_of_small_spline());
-  const auto whole =
-      std::ranges::find_if(exact.views, [](const auto& corners) { return corners.size() == 120; });
-  ASSERT_NE(whole, exact.views.end());
-  whole->resize(112);  // 28 tags with four corners each
-  const auto view = static_cast<std::size_t>(whole - exact.views.begin());
-  for (const std::size_t count : {7U, 8U}) {
-    IntrinsicsInput input = exact;
-    for (std::size_t k = 0; k < count; ++k) {
-      const std::size_t tag = 4 * k - (k >= 4 ? 2 : 0);  // tags that do not touch each other
-      input.views[view][4 * tag].pixel.x() += 0.4;
-    }
-    const auto solution = InitialSolutions(input).solve_first_stages(kSmallSpline);
-    ASSERT_TRUE(solution);
-    EXPECT_EQ(list_outlier_tags(*solution, input.lattice).size(), count == 7 ? 28U : 0U);
-  }
-}
-
-/// The noise of each view is inverse to its weight. The limit of weighted displacements is about
-/// nine times the weighted noise.
-TEST(SolveFirstStages, MarksTagsByWeightedDisplacementForSplinedLens) {
-  constexpr double noise_px = 0.03;
-  constexpr std::size_t displaced_view = 7, displaced_corner = 40;
-  IntrinsicsInput input = make_exact_views(10, lens_of_small_spline());
-  Random random(29);
-  for (std::size_t i = 0; i < 10; ++i) {
-    for (auto& corner : input.views[i]) {
-      corner.weight = i % 2 == 0 ? 0.5 : 2;
-      const double v = random.normal(), u = random.normal();
-      corner.pixel += noise_px / corner.weight * Eigen::Vector2d(u, v);
-    }
-  }
-  ASSERT_GT(input.views[displaced_view].size(), displaced_corner);
-  const std::size_t tag =
-      input.lattice.find_tag_index_of_point(input.views[displaced_view][displaced_corner].point);
-  for (const double displacement : {5.0, 16.0}) {
-    IntrinsicsInput displaced = input;
-    displaced.views[displaced_view][displaced_corner].pixel.x() += displacement * noise_px / 2;
-    const auto solution = InitialSolutions(displaced).solve_first_stages(kSmallSpline);
-    ASSERT_TRUE(solution);
-    const auto tags = list_outlier_tags(*solution, input.lattice);
-    EXPECT_EQ(tags.size(), displacement > 10 ? 4U : 0U);
-    for (const auto& found : tags) EXPECT_EQ(found, std::pair(displaced_view, tag));
   }
 }
 

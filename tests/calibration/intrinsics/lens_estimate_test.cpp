@@ -7,19 +7,15 @@
 #include <fmt/core.h>
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "calibration/intrinsics/board_print.h"
 #include "calibration/intrinsics/calibration_report.h"
 #include "calibration/intrinsics/projection_difference.h"
 #include "calibration/intrinsics/projection_uncertainty.h"
-#include "calibration/intrinsics/spline_fit.h"
 #include "calibration/intrinsics/synthetic_views.h"
 #include "calibration/intrinsics/wide_views.h"
 #include "camera/spline_grid.h"
@@ -201,14 +197,6 @@ TEST(EstimateLens, NamesSplineGridThatReachesAllBoards) {
                                     HasSubstr(": use --lens LENSMODEL_SPLI")));
 }
 
-TEST(EstimateLens, KeepsOpencvModelForBoardsNearAxisOfWideLens) {
-  LensViews input = make_wide_views(14, 40, LensModel::opencv8);
-  const LensEstimate result = estimate_lens(input);
-  ASSERT_TRUE(result.has_succeeded()) << result.problem;
-  EXPECT_FALSE(result.better_model);
-  EXPECT_THAT(result.warnings, IsEmpty());
-}
-
 TEST(EstimateLens, RecommendsFisheyeForBoardsFarOffAxis) {
   const LensEstimate result = estimate_lens(make_wide_views(24, 85, LensModel::opencv8));
   ASSERT_TRUE(result.has_succeeded()) << result.problem;
@@ -254,21 +242,6 @@ IntrinsicsInput make_solver_input(const LensEstimate& result, const Board& board
   return input;
 }
 
-TEST(EstimateLens, WarnsIfNoViewIsHeldOut) {
-  LensViews input = make_views(4);
-  input.held_out = 5;
-  const LensEstimate result = estimate_lens(input);
-  ASSERT_TRUE(result.has_succeeded()) << result.problem;
-  EXPECT_THAT(result.warnings, ElementsAre("no view is held out: 4 views are fewer than 5"));
-  EXPECT_THAT(result.images, SizeIs(4));
-  input.held_out = 4;
-  const LensEstimate last = estimate_lens(input);
-  ASSERT_TRUE(last.has_succeeded()) << last.problem;
-  EXPECT_THAT(last.warnings, IsEmpty());
-  EXPECT_THAT(last.images, ElementsAre("1.png", "2.png", "3.png"));
-  EXPECT_EQ(last.held_out.views, 1);
-}
-
 TEST(EstimateLens, StatesThatViewsAreParallel) {
   LensViews input = make_views(1, 0);
   input.views.resize(8, input.views[0]);
@@ -298,26 +271,6 @@ TEST(EstimateLens, CovarianceIsThatByTagsPlusBiasOfRegularization) {
   EXPECT_EQ(result.coverage.corners, coverage.corners);
   EXPECT_EQ(result.coverage.covered_fraction, coverage.covered_fraction);
   EXPECT_EQ(result.coverage.tilts_rad, coverage.tilts_rad);
-}
-
-TEST(EstimateLens, AddsVarianceOfPrintErrorToUncertainty) {
-  LensViews input = make_views(7);
-  const LensEstimate exact = estimate_lens(input);
-  input.board.print_sd = 0.001;
-  const LensEstimate result = estimate_lens(input);
-  ASSERT_TRUE(exact.has_succeeded() && result.has_succeeded());
-  const auto effect =
-      compute_board_aspect_error_effect_on_lens(exact.solution, 0.001, exact.report.region);
-  ASSERT_TRUE(effect && result.print_px);
-  EXPECT_NEAR(*result.print_px, effect->rms_px, 1e-9);
-  EXPECT_NEAR(
-      std::pow(result.report.uncertainty_mean_px, 2),
-      std::pow(exact.report.uncertainty_mean_px, 2) + std::pow(effect->mean_in_region_px, 2), 1e-9);
-  EXPECT_NEAR(
-      std::pow(result.report.uncertainty_worst_px, 2),
-      std::pow(exact.report.uncertainty_worst_px, 2) + std::pow(effect->worst_in_region_px, 2),
-      1e-9);
-  EXPECT_THAT(result.warnings, IsEmpty());
 }
 
 /// The limit of the displacement of the edges is 0.4 px.
@@ -359,52 +312,6 @@ TEST(EstimateLens, ReturnsWrongBoardForSpacingThatOnlyLensContradicts) {
   EXPECT_TRUE(result.solution.has_succeeded());
 }
 
-/// Returns the largest coordinates of a corner in the stereographic plane.
-Eigen::Vector2d compute_farthest_corner(const LensViews& input) {
-  Eigen::Vector2d farthest(0, 0);
-  for (const BoardView& view : input.views) {
-    for (const TagDetection& tag : view.detection.tags) {
-      for (const Eigen::Vector2d& pixel : tag.corners_px) {
-        const Eigen::Vector3d ray =
-            wide_lens().unproject_pixel(pixel).value().direction.normalized();
-        farthest = farthest.cwiseMax(ray.head<2>().cwiseAbs() * 2 / (1 + ray.z()));
-      }
-    }
-  }
-  return farthest;
-}
-
-TEST(EstimateLens, StatesExtentOfNarrowGridAndOfBoards) {
-  constexpr SplineGrid grid{3, 11, 9, 100};
-  const LensViews input = make_wide_views(8, 180, lens_model_for_spline_grid(grid));
-  const LensEstimate result = estimate_lens(input);
-  EXPECT_EQ(result.status, LensStatus::undetermined);
-  // The grid of 100 degrees has 11 - 3 pieces horizontally and 9 - 3 vertically.
-  const double u = 2 * std::tan(rad_from_deg(25)), v = u * 6 / 8;
-  const Eigen::Vector2d farthest = compute_farthest_corner(input);
-  const auto angle_deg = [](double at) { return 2 * deg_from_rad(std::atan(at / 2)); };
-  ASSERT_GT(std::abs(angle_deg(farthest.x()) - angle_deg(farthest.y())), 1);
-  EXPECT_EQ(
-      result.problem,
-      fmt::format("8 views with the board: the control points of {} extend to 50 degrees off axis "
-                  "horizontally and {:.0f} vertically, but the board is visible to {:.0f} and "
-                  "{:.0f} degrees: use --lens {}",
-                  splined_lens_model_name(grid), angle_deg(v), angle_deg(farthest.x()),
-                  angle_deg(farthest.y()),
-                  splined_lens_model_name(resize_spline_grid_to_reach(grid, 1.05 * farthest))));
-}
-
-TEST(EstimateLens, RecommendsFinerGridIfGridHasOnePieceBeyondImage) {
-  const LensEstimate result =
-      estimate_lens(make_wide_views(8, 180, lens_model_for_spline_grid({3, 4, 4, 359})));
-  EXPECT_EQ(result.status, LensStatus::undetermined);
-  EXPECT_THAT(result.problem,
-              AllOf(HasSubstr("8 views with the board: the control points of "),
-                    HasSubstr("fov_x_deg=359 do not cover the field of view, 112 degrees off axis "
-                              "horizontally and 112 vertically: use --lens LENSMODEL_SPLINED"),
-                    HasSubstr("Nx=4_Ny=4_fov_x_deg=230")));
-}
-
 TEST(EstimateLens, ComparesModelsWithFiveViewsUnlessSplined) {
   for (const int count : {4, 5}) {
     const LensEstimate result = estimate_lens(make_views(count));
@@ -412,14 +319,6 @@ TEST(EstimateLens, ComparesModelsWithFiveViewsUnlessSplined) {
     EXPECT_EQ(result.are_models_compared, count == 5);
     EXPECT_TRUE(count == 5 || !result.model_uncertainty);
   }
-}
-
-TEST(EstimateLens, AddsNoModelUncertaintyWithGoodViews) {
-  const LensEstimate result = estimate_lens(make_views(30));
-  ASSERT_TRUE(result.has_succeeded()) << result.problem;
-  EXPECT_TRUE(result.are_models_compared);
-  const double model_px = result.model_uncertainty ? result.model_uncertainty->worst_px : 0;
-  EXPECT_LT(model_px, 0.3 * result.report.uncertainty_worst_px);
 }
 
 TEST(EstimateLens, RecommendsFisheyeThatFitsClearlyBetterAndAddsModelUncertainty) {
@@ -455,14 +354,6 @@ TEST(EstimateLens, RecommendsFisheyeThatFitsClearlyBetterAndAddsModelUncertainty
               std::hypot(report.uncertainty_mean_px, model.mean_px), 1e-9);
 }
 
-TEST(EstimateLens, RecommendsFisheyeOfEqualFitBeyond74Degrees) {
-  for (const auto& [reach_deg, is_recommended] : {std::pair{72, false}, {77, true}}) {
-    const LensEstimate result = estimate_lens(make_wide_views(9, reach_deg, LensModel::opencv8));
-    ASSERT_TRUE(result.has_succeeded()) << result.problem;
-    EXPECT_EQ(result.better_model.has_value(), is_recommended) << reach_deg;
-  }
-}
-
 TEST(EstimateLens, RecommendsFisheyeIfNoLensOfModelFits) {
   const LensEstimate result = estimate_lens(make_wide_views(7, 80, LensModel::opencv5));
   EXPECT_EQ(result.status, LensStatus::undetermined);
@@ -479,24 +370,6 @@ BoardView make_far_view() {
       Eigen::AngleAxisd(rad_from_deg(78), Eigen::Vector3d::UnitY()).toRotationMatrix();
   return {"far.png", synthetic.imager_px,
           synthetic.view(towards, 1.2 * towards.col(2), random, kViewNoise_px)};
-}
-
-TEST(EstimateLens, RequiresThatGridCoversNineTenthsOfBoards) {
-  LensViews input = make_wide_views(10, 55, lens_model_for_spline_grid({3, 10, 10, 130}));
-  input.views.resize(12, make_far_view());
-  const LensEstimate result = estimate_lens(input);
-  EXPECT_EQ(result.status, LensStatus::undetermined);
-  EXPECT_THAT(result.problem, HasSubstr("fov_x_deg=130 extend to 65 degrees off axis"));
-}
-
-TEST(EstimateLens, AcceptsSmallGridThatCoversBoards) {
-  LensViews input = make_views(8);
-  input.lens_model = lens_model_for_spline_grid({3, 9, 8, 90});
-  const LensEstimate result = estimate_lens(input);
-  ASSERT_TRUE(result.has_succeeded()) << result.problem;
-  EXPECT_THAT(result.warnings, IsEmpty());
-  EXPECT_FALSE(result.intrinsics_covariance);
-  EXPECT_FALSE(result.are_models_compared);
 }
 
 /// A board beyond the control points has no pose.

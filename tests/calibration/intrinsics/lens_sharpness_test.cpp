@@ -62,16 +62,6 @@ TEST(MeasureLensSharpness, ReturnsMtf50AndNoDefectsForUniformBlur) {
   EXPECT_NEAR(even.black_level, 14.0 / 190, 1e-6);
 }
 
-TEST(MeasureLensSharpness, KeepsMeanMtf50WhenHalfOfViewsAreShaken) {
-  const LensSharpness still = measured(even_step);
-  const LensSharpness shaken = measured([](const Eigen::Vector2d& at_px, int view) {
-    EdgeStep step = even_step(at_px, view);
-    if (view % 2 == 0) step.blur_px = 2;
-    return step;
-  });
-  EXPECT_NEAR(shaken.mean_mtf50, still.mean_mtf50, 0.02 * still.mean_mtf50);
-}
-
 TEST(MeasureLensSharpness, ReportsAsymmetryForTiltedFocalPlane) {
   const LensSharpness tilted = measured([](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
@@ -80,17 +70,6 @@ TEST(MeasureLensSharpness, ReportsAsymmetryForTiltedFocalPlane) {
   });
   EXPECT_GT(tilted.asymmetry, 0.15);
   EXPECT_LT(tilted.worst_ratio, 0.9);
-}
-
-TEST(MeasureLensSharpness, ReportsNoAsymmetryForRadiallySymmetricBlur) {
-  const LensSharpness symmetric = measured([](const Eigen::Vector2d& at_px, int view) {
-    EdgeStep step = even_step(at_px, view);
-    step.blur_px *= 1 + 0.5 * (at_px - Eigen::Vector2d(400, 300)).squaredNorm() / 250000;
-    return step;
-  });
-  EXPECT_LT(symmetric.asymmetry, 0.03);
-  EXPECT_LT(symmetric.worst_ratio, 0.85);
-  EXPECT_LT(symmetric.local_loss, 0.05);
 }
 
 TEST(MeasureLensSharpness, ReturnsDepthAndPositionOfDustShadow) {
@@ -119,61 +98,12 @@ TEST(MeasureLensSharpness, ReportsLocalMtf50LossWhereLensIsSmeared) {
   EXPECT_LT(smeared.local_shadow, 0.01);
 }
 
-/// A part of the image with few views is not sharper than the others.
-TEST(MeasureLensSharpness, Mtf50IsUnbiasedInImagePartsWithFewerViews) {
-  std::mt19937 random(3);
-  std::normal_distribution<double> of_view(0, 0.1);
-  std::vector<double> ratios;
-  for (int set = 0; set < 20; ++set) {
-    std::array<double, 24> factors{};
-    for (double& factor : factors) factor = 1 + of_view(random);
-    const LensSharpness uneven =
-        measure_lens_sharpness(make_views([&](const Eigen::Vector2d& at_px, int view) {
-                                 EdgeStep step = even_step(at_px, view);
-                                 step.blur_px *= factors[static_cast<std::size_t>(view)];
-                                 if (at_px.x() < 200 && view >= 6)
-                                   step.blur_px = 0;  // not measured
-                                 return step;
-                               }),
-                               kSharpnessImager_px)
-            .value();
-    ratios.push_back(uneven.mtf50.at(1, 4) / uneven.mtf50.at(8, 4));
-  }
-  double mean = 0;
-  for (const double ratio : ratios) mean += ratio / 20;
-  EXPECT_NEAR(mean, 1, 0.03);
-}
-
-TEST(MeasureLensSharpness, ReturnsNanShadowForFewerThanEightTagsPerView) {
-  // Seven tags in a view are 28 edges, too few for a field of the light; all views cover the image.
-  const auto dense = make_views(even_step, 140);
-  std::vector<BoardView> views;
-  for (std::size_t i = 0; i < dense.size(); ++i) {
-    BoardView& view = views.emplace_back(dense[i]);
-    std::erase_if(view.detection.tags, [&](const TagDetection& tag) {
-      return static_cast<std::size_t>(tag.id) % 28 != i % 28;
-    });
-    ASSERT_LT(view.detection.tags.size(), 8U);
-  }
-  const auto found = measure_lens_sharpness(views, kSharpnessImager_px);
-  ASSERT_TRUE(found);
-  EXPECT_TRUE(std::isfinite(found->local_loss));
-  EXPECT_TRUE(std::isnan(found->local_shadow));
-}
-
 TEST(MeasureLensSharpness, ReturnsNulloptWhenTagsHaveNoEdgeSteps) {
   auto views = make_views(even_step, 6);
   for (BoardView& view : views) {
     for (TagDetection& tag : view.detection.tags) tag.steps = {};
   }
   EXPECT_FALSE(measure_lens_sharpness(views, kSharpnessImager_px));
-}
-
-TEST(ComputeMedianEdgeMtf50, MatchesMtf50OfUniformEdgeBlur) {
-  const auto views = make_views(even_step, 1);
-  const auto found = compute_median_edge_mtf50(views[0].detection);
-  ASSERT_TRUE(found);
-  EXPECT_NEAR(*found, compute_mtf50_of_gaussian_blur(kLensBlur_px), 0.01 * *found);
 }
 
 TEST(ComputeMedianEdgeMtf50, ReturnsMtf50OfUpperMedianBlur) {
@@ -271,16 +201,6 @@ TEST(ComputeMtf50OfGaussianBlur, IsFrequencyOfHalfModulation) {
   }
 }
 
-TEST(ComputeMedianEdgeMtf50, SkipsEdgesWithoutBlurOrWithoutLight) {
-  BoardDetection seen;
-  seen.tags.push_back(make_square_tag(0, {50, 50}, 5));
-  EXPECT_FALSE(compute_median_edge_mtf50(seen)) << "no edge is measured";
-  seen.tags[0].steps = {{{0.5, 1, 9}, {0, 1, 9}, {0.6, 1, 0}, {0, 1, 9}}};
-  const auto found = compute_median_edge_mtf50(seen);
-  ASSERT_TRUE(found);
-  EXPECT_DOUBLE_EQ(*found, compute_mtf50_of_gaussian_blur(0.5));
-}
-
 TEST(MeasureLensSharpness, EachPartHasLowerQuartileOfViewMedians) {
   // Upper medians of the four edges: 1.1 times the blur of the view.
   const std::array<double, 4> edges{1.1, 0.9, 1.4, 1.0};
@@ -307,35 +227,6 @@ TEST(MeasureLensSharpness, EachPartHasLowerQuartileOfViewMedians) {
     EXPECT_NEAR(found->mean_mtf50, sum / 108, 1e-12);
     const double worst = compute_mtf50_of_gaussian_blur(uneven_value(11, 8) * quartile);
     EXPECT_NEAR(found->worst_ratio, worst / (sum / 108), 1e-12);
-  }
-}
-
-TEST(MeasureLensSharpness, PartNeedsFiveViewsForMtf50AndThreeForContrast) {
-  const auto found = measure_parts(
-      [](int col, int, int view, std::size_t) {
-        // The first columns are measured in two to four views only.
-        return EdgeStep{col < 3 && view >= 2 + col ? 0 : 0.8, 20, 200};
-      },
-      6);
-  ASSERT_TRUE(found);
-  for (int row = 0; row < 9; ++row) {
-    for (int col = 0; col < 12; ++col) {
-      EXPECT_EQ(std::isnan(found->mtf50.at(col, row)), col < 3);
-      EXPECT_EQ(std::isnan(found->black_to_white.at(col, row)), col < 1);
-    }
-  }
-  EXPECT_NEAR(found->mean_mtf50, compute_mtf50_of_gaussian_blur(0.8), 1e-12);
-  EXPECT_NEAR(found->black_level, 0.1, 1e-12);
-}
-
-TEST(MeasureLensSharpness, NeedsHalfOfParts) {
-  for (const int known : {53, 54}) {
-    const auto found = measure_parts(
-        [&](int col, int row, int, std::size_t) {
-          return EdgeStep{row * 12 + col < known ? 0.8 : 0, 20, 200};
-        },
-        5);
-    EXPECT_EQ(found.has_value(), known == 54) << known;
   }
 }
 
@@ -388,21 +279,6 @@ TEST(MeasureLensSharpness, AsymmetryIsTwiceTheSumOfDipoleAndQuadrupole) {
   EXPECT_NEAR(found->asymmetry, 2 * (0.05 + 0.013) / (sum / 90), 1e-10);
 }
 
-TEST(MeasureLensSharpness, BlackLevelIsUpperMedianOfPartsWithoutNegativeRatios) {
-  const auto found = measure_parts(
-      [](int col, int row, int view, std::size_t edge) {
-        // Edges 10, 20, 30, 40 of 200 and views 0, 10, 20: the median is 30 + 10 of 200.
-        const double dark = col == 0 ? -30 : 10. * (1 + static_cast<double>(edge)) + view % 3 * 10;
-        return EdgeStep{0.8, dark, row < 4 ? 200. : 400.};
-      },
-      6);
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->black_to_white.at(0, 5), 0);
-  EXPECT_NEAR(found->black_to_white.at(3, 3), 0.2, 1e-12);
-  EXPECT_NEAR(found->black_to_white.at(3, 4), 0.1, 1e-12);
-  EXPECT_NEAR(found->black_level, 0.1, 1e-12) << "5 of 9 rows have the ratio 0.1, or 0";
-}
-
 TEST(MeasureLensSharpness, LocalLossComparesWithMediansOfOppositeParts) {
   Random random(5);
   std::vector<double> values(108);
@@ -421,35 +297,6 @@ TEST(MeasureLensSharpness, LocalLossComparesWithMediansOfOppositeParts) {
   EXPECT_GT(found->local_loss, 0.1);
 }
 
-TEST(MeasureLensSharpness, LocalLossIncludesLossOfContrast) {
-  Random random(6);
-  std::vector<double> values(108);
-  for (double& value : values) value = random.uniform(20, 60);
-  const auto found = measure_parts(
-      [&](int col, int row, int, std::size_t) {
-        return EdgeStep{0.8, values[static_cast<std::size_t>(12 * row + col)], 200};
-      },
-      5);
-  ASSERT_TRUE(found);
-  LensSharpness::Map contrasts = found->black_to_white;
-  for (std::size_t i = 0; i < 108; ++i) {
-    EXPECT_NEAR(found->black_to_white.values[i], values[i] / 200, 1e-12);
-    contrasts.values[i] = (200 - values[i]) / (200 + values[i]);
-  }
-  EXPECT_NEAR(found->local_loss, compute_expected_local_loss(contrasts, 2), 1e-12);
-  EXPECT_GT(found->local_loss, 0.05);
-}
-
-TEST(MeasureLensSharpness, LocalLossOfSinglePartIsItsLossOfMtf50) {
-  const auto found = measure_parts(
-      [](int col, int row, int, std::size_t) {
-        return EdgeStep{col == 2 && row == 6 ? 1.0 : 0.8, 20, 200};
-      },
-      5);
-  ASSERT_TRUE(found);
-  EXPECT_NEAR(found->local_loss, 0.2, 1e-12);
-}
-
 TEST(MeasureLensSharpness, LocalShadowIsLossOfMeanLightInMiddleOfItsPart) {
   // The light decreases smoothly to the right and down, and is reduced to 70 to 90 % in one part.
   const std::array<double, 4> shadow{0.7, 0.9, 0.75, 0.85};
@@ -466,61 +313,6 @@ TEST(MeasureLensSharpness, LocalShadowIsLossOfMeanLightInMiddleOfItsPart) {
   EXPECT_NEAR(found->light.at(17, 5), 0.8, 0.01);
   EXPECT_NEAR(found->light.at(3, 12), 1, 0.01);
   EXPECT_NEAR(found->local_shadow, compute_expected_local_loss(found->light, 4), 1e-12);
-}
-
-TEST(MeasureLensSharpness, LocalShadowComparesLightWithMediansOfOppositeParts) {
-  Random random(7);
-  std::vector<double> values(432);
-  for (double& value : values) value = random.uniform(150, 200);
-  const auto found = measure_parts(
-      [&](int col, int row, int view, std::size_t) {
-        const bool is_seen = col > 3 || view < 2;
-        return EdgeStep{is_seen ? 0.8 : 0, 10, values[static_cast<std::size_t>(24 * row + col)]};
-      },
-      5, 24, 18);
-  ASSERT_TRUE(found);
-  EXPECT_TRUE(std::isnan(found->light.at(3, 9))) << "two views";
-  EXPECT_FALSE(std::isnan(found->light.at(4, 9)));
-  EXPECT_GT(found->local_shadow, 0.05);
-  EXPECT_NEAR(found->local_shadow, compute_expected_local_loss(found->light, 4), 1e-12);
-}
-
-TEST(MeasureLensSharpness, LightNeedsThirtyTwoEdgesPerView) {
-  for (const int edges : {31, 32}) {
-    // Each view of eight tags covers a part of a row; five views each.
-    std::vector<BoardView> views;
-    for (const BoardView& whole : make_views_of_parts(
-             [](int, int, int, std::size_t) {
-               return EdgeStep{0.8, 20, 200};
-             },
-             5)) {
-      for (int row = 0; row < 9; ++row) {
-        BoardView& view = views.emplace_back(whole);
-        std::erase_if(view.detection.tags, [&](const TagDetection& tag) {
-          return tag.id / 12 != row || tag.id % 12 >= 8;
-        });
-        ASSERT_EQ(view.detection.tags.size(), 8U);
-        if (edges < 32) view.detection.tags[3].steps[2].blur_px = 0;
-      }
-    }
-    const auto found = measure_lens_sharpness(views, kPartsImager_px);
-    ASSERT_TRUE(found);
-    EXPECT_EQ(std::isnan(found->light.at(0, 1)), edges < 32);
-  }
-}
-
-/// The smooth field of the light ignores the dark parts, so that the others have the value 1.
-TEST(MeasureLensSharpness, LightOfOtherPartsIsOneBesideManyDarkParts) {
-  const auto is_dark = [](int col, int row) { return col > 3 && col < 9 && row > 10 && row < 16; };
-  const auto found = measure_parts(
-      [&](int col, int row, int, std::size_t) {
-        return EdgeStep{0.8, 10, is_dark(col, row) ? 100. : 200.};
-      },
-      5, 24, 18);
-  ASSERT_TRUE(found);
-  EXPECT_NEAR(found->light.at(5, 12), 0.5, 0.01);
-  EXPECT_NEAR(found->light.at(2, 12), 1, 0.03);
-  EXPECT_NEAR(found->light.at(20, 3), 1, 0.01);
 }
 
 }  // namespace

@@ -72,27 +72,6 @@ TEST_F(ComputeModelUncertainty, ReturnsDifferenceToOneModel) {
   EXPECT_LT(found->mean_px, 0.7 * found->worst_px);
 }
 
-TEST_F(ComputeModelUncertainty, SubtractsSquareOfNoise) {
-  const auto all = compute({longer});
-  ASSERT_TRUE(all);
-  const auto part = compute({longer}, 0.6 * all->worst_px);
-  ASSERT_TRUE(part);
-  EXPECT_NEAR(part->worst_px, 0.8 * all->worst_px, 1e-3);
-  EXPECT_NEAR(part->mean_px, 0.8 * all->mean_px, 1e-3);
-  EXPECT_NEAR(part->intrinsics_covariance(0, 0), 0.64 * all->intrinsics_covariance(0, 0), 1e-2);
-  EXPECT_FALSE(compute({longer}, 1.01 * all->worst_px));
-  EXPECT_FALSE(compute({}));
-}
-
-TEST_F(ComputeModelUncertainty, CountsEqualAndSmallerParallelDifferencesOnce) {
-  const auto one = compute({longer}, 0.1);
-  const auto three = compute({solve_exact_views(LensModel::opencv5, 521), longer, longer}, 0.1);
-  ASSERT_TRUE(one && three);
-  EXPECT_NEAR(three->worst_px, one->worst_px, 1e-3);
-  EXPECT_NEAR(three->mean_px, one->mean_px, 1e-3);
-  EXPECT_NEAR(three->intrinsics_covariance(0, 0), one->intrinsics_covariance(0, 0), 0.01);
-}
-
 /// The covariances of differences in other directions add up if noise explains none of them.
 TEST_F(ComputeModelUncertainty, AddsDifferencesInOtherDirections) {
   const IntrinsicsSolution bent = solve_exact_views(LensModel::opencv5, 520, -0.22);
@@ -111,29 +90,6 @@ TEST_F(ComputeModelUncertainty, AddsDifferencesInOtherDirections) {
   EXPECT_LT((both->intrinsics_covariance - sum).norm(), 0.01 * sum.norm());
   EXPECT_GT(both->worst_px, std::max(first->worst_px, second->worst_px));
   EXPECT_LE(both->worst_px, std::hypot(first->worst_px, second->worst_px) + 1e-9);
-}
-
-TEST(ListFitsOfPossibleModels, OmitsRejectedModelsUnlessTheyFitBetterThanRejectedLens) {
-  IntrinsicsSolution solution{}, other{};
-  solution.problem.lens_model = LensModel::opencv4;
-  other.problem.lens_model = LensModel::opencv5;
-  LensChoice comparison{LensModel::opencv4,
-                        {{LensModel::opencv4, 0.05, 0, 0.1, 0, solution},
-                         {LensModel::opencv5, 0.052, 0.04, 0.1, 0, other}}};
-  const auto count = [&] { return list_fits_of_possible_models(solution, comparison).size(); };
-  ASSERT_EQ(count(), 1U);
-  EXPECT_EQ(list_fits_of_possible_models(solution, comparison)[0].problem.lens_model,
-            LensModel::opencv5);
-  comparison.candidates[1].excess = 0.2;
-  EXPECT_EQ(count(), 0U);
-  comparison.candidates[1].max_plausible_excess = 0.21;
-  EXPECT_EQ(count(), 1U);
-  comparison.candidates[1].max_plausible_excess = 0;
-  comparison.candidates[0].excess = 0.3;
-  EXPECT_EQ(count(), 1U);
-  comparison.candidates[0].excess = 0;
-  comparison.candidates[1] = {LensModel::opencv5};
-  EXPECT_EQ(count(), 0U);
 }
 
 /// Returns views of nearly the same tilt around the middle of the image.

@@ -4,9 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -135,15 +133,6 @@ TEST(EvaluateLensOnHeldOutViews, RmsOfHeldOutViewsMatchesCornerNoise) {
   EXPECT_NEAR(held_out.rms_px, 0.05, 0.006);
 }
 
-TEST(RecommendNextBoardView, NamesImagePartWithFewestCornersAndLeastTiltedSide) {
-  ViewCoverage coverage;
-  coverage.corners = {9, 9, 9, 9, 9, 2, 9, 9, 9};
-  coverage.tilts_rad = {0.5, 0.6, 0.1, 0.5};
-  EXPECT_EQ(recommend_next_board_view(coverage),
-            "the board in the right middle of the image, its upper side 30 to 40 degrees nearer to "
-            "the camera");
-}
-
 TEST(ComputeBoardViewCoverage, ReturnsTiltOnlyForSideNearerToCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(9);
@@ -219,227 +208,6 @@ IntrinsicsSolution make_known_solution_of_board(bool kalibr, int count = 4, doub
   return solution;
 }
 
-/// Dense matrices of the linearized problem.
-struct DenseProblem {
-  explicit DenseProblem(const IntrinsicsSolution& solution)
-      : at(linearize_board_problem(solution.problem, solution.solved_parameters)),
-        jacobian(Eigen::MatrixXd(at.jacobian_transposed).transpose()),
-        corners(jacobian.topRows(at.residuals_px.size())),
-        inverse((jacobian.transpose() * jacobian).inverse()) {}
-
-  /// Covariance of the state in its units from that of the packed gradient.
-  Eigen::MatrixXd compute_state_covariance(const Eigen::MatrixXd& gradient) const {
-    return at.scale.asDiagonal() * inverse * gradient * inverse * at.scale.asDiagonal();
-  }
-
-  Linearization at;
-  Eigen::MatrixXd jacobian, corners, inverse;
-};
-
-/// Covariance of the state for independent corners: the variance of the used residuals times
-/// N^-1 Jo' Jo N^-1.
-Eigen::MatrixXd compute_expected_covariance_by_corners(const IntrinsicsSolution& solution) {
-  const DenseProblem dense(solution);
-  std::vector<double> used;
-  for (std::size_t i = 0; i < solution.problem.points.size(); ++i) {
-    if (solution.problem.points[i].z() < 0) continue;
-    used.push_back(dense.at.residuals_px[2 * static_cast<Eigen::Index>(i)]);
-    used.push_back(dense.at.residuals_px[2 * static_cast<Eigen::Index>(i) + 1]);
-  }
-  double mean = 0, variance = 0;
-  for (const double residual : used) mean += residual / static_cast<double>(used.size());
-  for (const double residual : used) {
-    variance += (residual - mean) * (residual - mean) / static_cast<double>(used.size());
-  }
-  return dense.compute_state_covariance(variance * dense.corners.transpose() * dense.corners);
-}
-
-/// Covariance of the state for tags whose corners have correlated errors. `tag_of_point`: index of
-/// the tag of a point of a part.
-template <typename TagOfPoint>
-Eigen::MatrixXd compute_expected_covariance_by_tags(const IntrinsicsSolution& solution, int parts,
-                                                    const TagOfPoint& tag_of_point) {
-  const DenseProblem dense(solution);
-  const auto points = static_cast<Eigen::Index>(solution.problem.num_points_per_board());
-  const Eigen::Index states = dense.jacobian.cols(), tags = 60;
-  const Eigen::Index views = std::ssize(solution.problem.poses) / parts;
-  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(states, views * tags);
-  for (Eigen::Index i = 0; i < std::ssize(solution.problem.points); ++i) {
-    const Eigen::Index view = i / points / parts;
-    sums.col(view * tags + tag_of_point(i % points)) +=
-        dense.corners.middleRows<2>(2 * i).transpose() * dense.at.residuals_px.segment<2>(2 * i);
-  }
-  const auto used = std::count_if(solution.problem.points.begin(), solution.problem.points.end(),
-                                  [](const Eigen::Vector3d& point) { return point.z() > 0; });
-  const double residuals = 2 * static_cast<double>(used);
-  return dense.compute_state_covariance(residuals / (residuals - static_cast<double>(states)) *
-                                        sums * sums.transpose());
-}
-
-/// Covariance of a pixel from that of the state: by difference quotients of its change with the
-/// intrinsics and with the mean rotation of the boards.
-Eigen::Matrix2d compute_expected_pixel_covariance(const IntrinsicsSolution& solution,
-                                                  const Eigen::MatrixXd& state_covariance,
-                                                  const Eigen::Vector2d& pixel) {
-  const BoardProblem& problem = solution.problem;
-  const Eigen::Vector3d ray = solution.fitted_lens().unproject_pixel(pixel).value().direction;
-  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(2, state_covariance.rows());
-  for (std::size_t k = 0; k < problem.intrinsics.size(); ++k) {
-    const double step = k < 4 ? 1e-3 : 1e-6;
-    const auto project_ray = [&](double change) {
-      auto changed = problem.intrinsics;
-      changed[k] += change;
-      return Lens(problem.lens_model, changed).project_point(ray).value();
-    };
-    gradient.col(static_cast<Eigen::Index>(k)) =
-        (project_ray(step) - project_ray(-step)) / (2 * step);
-  }
-  const auto matrix = [](const Eigen::Vector3d& r) {
-    return Eigen::AngleAxisd(r.norm(), r.normalized()).toRotationMatrix();
-  };
-  const auto first = static_cast<Eigen::Index>(problem.intrinsics.size());
-  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
-    for (int axis = 0; axis < 3; ++axis) {
-      constexpr double step = 1e-6;
-      const Eigen::Vector3d d = step * Eigen::Vector3d::Unit(axis);
-      const auto project_ray = [&](const Eigen::Vector3d& rotation) {
-        const Eigen::Matrix3d turn =
-            matrix(rotation) * matrix(problem.poses[i].rotation).transpose();
-        return solution.fitted_lens().project_point(turn * ray).value();
-      };
-      gradient.col(first + 6 * static_cast<Eigen::Index>(i) + axis) =
-          (project_ray(problem.poses[i].rotation + d) -
-           project_ray(problem.poses[i].rotation - d)) /
-          (2 * step * static_cast<double>(problem.poses.size()));
-    }
-  }
-  return gradient * state_covariance * gradient.transpose();
-}
-
-void expect_covariances(const ProjectionUncertainty& uncertainty,
-                        const IntrinsicsSolution& solution, const Eigen::MatrixXd& of_state) {
-  ASSERT_TRUE(uncertainty.are_intrinsics_determined());
-  const auto count = static_cast<Eigen::Index>(solution.problem.intrinsics.size());
-  const Eigen::MatrixXd intrinsics = uncertainty.intrinsics_covariance();
-  ASSERT_EQ(intrinsics.rows(), count);
-  ASSERT_EQ(intrinsics.cols(), count);
-  for (Eigen::Index i = 0; i < count; ++i) {
-    for (Eigen::Index j = 0; j < count; ++j) {
-      EXPECT_NEAR(intrinsics(i, j), of_state(i, j),
-                  1e-6 * std::sqrt(of_state(i, i) * of_state(j, j)))
-          << i << ' ' << j;
-    }
-  }
-  EXPECT_NEAR(uncertainty.focal_x_sd_px(), std::sqrt(of_state(0, 0)),
-              1e-6 * std::sqrt(of_state(0, 0)));
-  for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(700, 80), Eigen::Vector2d(390, 310)}) {
-    const Eigen::Matrix2d found = uncertainty.projection_covariance(pixel);
-    const Eigen::Matrix2d expected = compute_expected_pixel_covariance(solution, of_state, pixel);
-    EXPECT_LT((found - expected).norm(), 1e-5 * expected.norm());
-    const Eigen::Vector2d variances =
-        Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(found).eigenvalues();
-    EXPECT_NEAR(uncertainty.projection_sd_along_worst_direction_px(pixel), std::sqrt(variances[1]),
-                1e-9);
-  }
-}
-
-TEST(ProjectionUncertainty, MatchesDenseCovarianceOfIndependentCorners) {
-  for (const bool kalibr : {false, true}) {
-    const IntrinsicsSolution solution = make_known_solution_of_board(kalibr);
-    expect_covariances(ProjectionUncertainty(solution), solution,
-                       compute_expected_covariance_by_corners(solution));
-  }
-}
-
-TEST(ProjectionUncertainty, MatchesDenseCovarianceOfCorrelatedCornersOfTags) {
-  // A plain board of 6 x 5 tags is a lattice of 12 x 10 points.
-  const IntrinsicsSolution plain = make_known_solution_of_board(false);
-  const ProjectionUncertainty by_tags(plain, BoardLattice(synthetic_board(false)));
-  expect_covariances(by_tags, plain,
-                     compute_expected_covariance_by_tags(plain, 1, [](Eigen::Index point) {
-                       return point / 12 / 2 * 6 + point % 12 / 2;
-                     }));
-  const IntrinsicsSolution kalibr = make_known_solution_of_board(true);
-  const ProjectionUncertainty of_parts(kalibr, BoardLattice(synthetic_board(true)));
-  expect_covariances(
-      of_parts, kalibr,
-      compute_expected_covariance_by_tags(kalibr, 4, [](Eigen::Index point) { return point; }));
-}
-
-TEST(ProjectionUncertainty, ByCornersAndByTagsMatchBothConstructors) {
-  const IntrinsicsSolution solution = make_known_solution_of_board(false, 3);
-  const BoardLattice lattice(synthetic_board(false));
-  const auto both =
-      ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(solution, lattice);
-  const auto expect_equal = [](const Eigen::MatrixXd& found, const Eigen::MatrixXd& expected) {
-    ASSERT_EQ(found.rows(), 8);
-    ASSERT_EQ(expected.rows(), 8);
-    const Eigen::VectorXd inverse = expected.diagonal().cwiseSqrt().cwiseInverse();
-    EXPECT_LT((inverse.asDiagonal() * (found - expected) * inverse.asDiagonal()).norm(), 1e-6);
-  };
-  expect_equal(both.by_corners.intrinsics_covariance(),
-               ProjectionUncertainty(solution).intrinsics_covariance());
-  expect_equal(both.by_tags.intrinsics_covariance(),
-               ProjectionUncertainty(solution, lattice).intrinsics_covariance());
-  EXPECT_GT(std::abs(both.by_tags.focal_x_sd_px() / both.by_corners.focal_x_sd_px() - 1), 0.01);
-}
-
-/// Bias by the formula of ProjectionUncertainty with dense matrices, for the noise `sd_px`.
-Eigen::VectorXd compute_expected_regularization_bias(const IntrinsicsSolution& solution,
-                                                     double sd_px) {
-  const DenseProblem dense(solution);
-  const Eigen::Index corners = dense.corners.rows();
-  const Eigen::MatrixXd regularization = dense.jacobian.bottomRows(dense.jacobian.rows() - corners);
-  const double ratio = std::pow(sd_px / solution.problem.noise_px, 2);
-  const Eigen::MatrixXd normal = dense.corners.transpose() * dense.corners +
-                                 ratio * regularization.transpose() * regularization;
-  const Eigen::VectorXd packed =
-      normal.inverse() * ((1 - ratio) * regularization.transpose() * dense.at.regularization);
-  return (dense.at.scale.asDiagonal() * packed)
-      .head(static_cast<Eigen::Index>(solution.problem.intrinsics.size()));
-}
-
-double compute_sd_of_used_residuals(const IntrinsicsSolution& solution) {
-  const DenseProblem dense(solution);
-  double used = 0, sum = 0, squares = 0;
-  for (std::size_t i = 0; i < solution.problem.points.size(); ++i) {
-    if (solution.problem.points[i].z() < 0) continue;
-    const auto residual = dense.at.residuals_px.segment<2>(2 * static_cast<Eigen::Index>(i));
-    used += 2;
-    sum += residual.sum();
-    squares += residual.squaredNorm();
-  }
-  return std::sqrt(squares / used - sum * sum / (used * used));
-}
-
-TEST(ProjectionUncertainty, RegularizationBiasMatchesDenseFormula) {
-  IntrinsicsSolution solution = make_known_solution_of_board(false, 4, 0.4);
-  for (const double noise_px : {1.0, 0.7}) {
-    solution.problem.noise_px = noise_px;
-    const Eigen::VectorXd expected =
-        compute_expected_regularization_bias(solution, compute_sd_of_used_residuals(solution));
-    const Eigen::VectorXd found = ProjectionUncertainty(solution).intrinsics_regularization_bias();
-    ASSERT_EQ(found.size(), 8);
-    EXPECT_GT(expected.norm(), 1e-7);
-    EXPECT_LT((found - expected).cwiseAbs().cwiseQuotient(expected.cwiseAbs()).maxCoeff(), 1e-5);
-  }
-}
-
-/// Noise below 0.01 px counts as 0.01 px. Noise above BoardProblem::noise_px gives no bias.
-TEST(ProjectionUncertainty, RegularizationBiasBoundsNoise) {
-  const IntrinsicsSolution exact = make_known_solution_of_board(false, 4, 0);
-  ASSERT_LT(compute_sd_of_used_residuals(exact), 1e-6);
-  const Eigen::VectorXd expected = compute_expected_regularization_bias(exact, 0.01);
-  const Eigen::VectorXd found = ProjectionUncertainty(exact).intrinsics_regularization_bias();
-  ASSERT_EQ(found.size(), 8);
-  EXPECT_LT((found - expected).cwiseAbs().cwiseQuotient(expected.cwiseAbs()).maxCoeff(), 1e-6);
-
-  const IntrinsicsSolution noisy = make_known_solution_of_board(false, 4, 2);
-  ASSERT_GT(compute_sd_of_used_residuals(noisy), 1);
-  EXPECT_EQ(ProjectionUncertainty(noisy).intrinsics_regularization_bias(),
-            Eigen::VectorXd::Zero(8));
-}
-
 TEST(ProjectionUncertainty, IsInfiniteWhenViewHasNoCorners) {
   IntrinsicsSolution solution = make_known_solution_of_board(false, 3);
   for (std::size_t i = 0; i < solution.problem.num_points_per_board(); ++i) {
@@ -455,13 +223,6 @@ TEST(ProjectionUncertainty, IsInfiniteWhenViewHasNoCorners) {
   ASSERT_EQ(covariance.cols(), 8);
   EXPECT_TRUE(std::isinf(covariance.minCoeff()));
   EXPECT_EQ(uncertainty.intrinsics_regularization_bias(), Eigen::VectorXd::Zero(8));
-}
-
-TEST(ProjectionUncertainty, IsInfiniteAtPixelWithoutRay) {
-  const ProjectionUncertainty uncertainty(make_known_solution_of_board(false, 3));
-  const Eigen::Vector2d outside(std::numeric_limits<double>::quiet_NaN(), 300);
-  EXPECT_TRUE(std::isinf(uncertainty.projection_sd_along_worst_direction_px(outside)));
-  EXPECT_TRUE(std::isinf(uncertainty.projection_covariance(outside)(1, 1)));
 }
 
 /// Returns a solution of boards with these rotations, one board per view.
@@ -670,17 +431,6 @@ TEST(ComputeLensCalibrationReport, FieldsMatchTheirDefinitions) {
   expect_report_matches_definitions(
       make_known_solution_of_board(false, 8),
       {BoardLattice(synthetic_board(false)), {}, {800, 600}, LensModel::opencv4});
-}
-
-/// The image circle of the fisheye ends 365 px from the middle of the image.
-TEST(ComputeLensCalibrationReport, SkipsPixelsWithoutRaysOfFisheye) {
-  const std::array fisheye{300.0, 300.0, 400.0, 300.0, -0.1, 0.0, 0.0, 0.0};
-  IntrinsicsSolution solution =
-      make_known_solution({synthetic_board(false), Lens(LensModel::fisheye, fisheye)}, 8, 0.1, 12);
-  solution.problem.intrinsics.assign(fisheye.begin(), fisheye.end());
-  ASSERT_FALSE(solution.fitted_lens().unproject_pixel({5, 5}));
-  expect_report_matches_definitions(
-      solution, {BoardLattice(synthetic_board(false)), {}, {800, 600}, LensModel::fisheye});
 }
 
 TEST(ComputeLensCalibrationReport, HasNoSplitHalfDifferenceIfHalfHasTwoViews) {

@@ -4,14 +4,11 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <iterator>
 #include <tuple>
-#include <utility>
 #include <vector>
 
 #include "calibration/intrinsics/board_lattice.h"
@@ -185,138 +182,6 @@ TEST(EstimateLens, ReturnsAllViewsCorrectedForEstimatedToneCurve) {
     }
   }
   EXPECT_NE(expected[0].detection.tags[0].corners_px, views[0].detection.tags[0].corners_px);
-}
-
-/// Computes gamma from the costs that the header states, with a solved lens for each curve. Views
-/// that the solve without a curve drops are left out for all curves.
-double compute_expected_gamma(std::vector<BoardView> views, const Board& board,
-                              LensModel model = LensModel::opencv8) {
-  const double levels_gamma = estimate_tone_curve_gamma(sum_tone_curve_costs(views));
-  IntrinsicsInput input{BoardLattice(board), {}, views[0].imager_px, model};
-  ValuesPerGamma ratios{};
-  for (std::size_t curve = 0; curve < kGammas.size(); ++curve) {
-    input.views.clear();
-    std::vector<double> sds_px;
-    for (const BoardView& view : views) {
-      BoardDetection seen = view.detection;
-      for (TagDetection& tag : seen.tags) {
-        if (curve > 0) {
-          tag.corners_px = tag.tone_curve_fits[curve - 1].corners_px;
-          tag.corner_sds_px = tag.tone_curve_fits[curve - 1].corner_sds_px;
-        }
-        std::ranges::copy_if(tag.corner_sds_px, std::back_inserter(sds_px),
-                             [](double sd_px) { return sd_px > 0; });
-      }
-      input.views.push_back(input.lattice.list_corners_with_board_positions(seen));
-    }
-    const IntrinsicsSolution solution = solve_intrinsics(input);
-    EXPECT_TRUE(solution.has_succeeded());
-    if (curve == 0) {
-      input.warp = solution.solved_parameters.warp ? WarpChoice::on : WarpChoice::off;
-      std::vector<BoardView> kept;
-      for (const std::size_t view : solution.views) kept.push_back(views[view]);
-      views = kept;
-    }
-    std::sort(sds_px.begin(), sds_px.end());
-    ratios[curve] = solution.rms_px / sds_px[sds_px.size() / 2];
-  }
-  const double count = 50 / *std::min_element(ratios.begin(), ratios.end());
-  ValuesPerGamma costs{};
-  for (std::size_t i = 0; i < costs.size(); ++i) {
-    costs[i] =
-        count * std::log(ratios[i]) + std::pow(std::log(kGammas[i] / levels_gamma) / 0.2, 2) / 2;
-  }
-  return estimate_tone_curve_gamma(costs);
-}
-
-TagDetection::Corners displace_corners(TagDetection::Corners corners_px) {
-  for (auto& corner : corners_px) corner.y() += 15;
-  return corners_px;
-}
-
-TEST(EstimateAndCorrectToneCurve, MinimizesSumOfCostsOfResidualsAndGrayLevels) {
-  auto views = CodedCamera{1.7, 2.3, 0.08}.views(7, 8);
-  // The standard deviations differ from corner to corner and from curve to curve.
-  for (BoardView& view : views) {
-    for (TagDetection& tag : view.detection.tags) {
-      const double scale = tag.id % 4 == 0 ? 0 : 1 + 0.1 * (tag.id % 7);  // 0: unknown
-      for (double& sd_px : tag.corner_sds_px) sd_px *= scale;
-      for (std::size_t i = 0; i < tag.tone_curve_fits.size(); ++i) {
-        for (double& sd_px : tag.tone_curve_fits[i].corner_sds_px) {
-          sd_px *= scale * (1 + 0.02 * static_cast<double>(i));
-        }
-      }
-    }
-  }
-  // A view does not fit without a curve, another one with the first curve only.
-  for (TagDetection& tag : views[1].detection.tags) {
-    if (tag.id % 2 == 0) tag.corners_px = displace_corners(tag.corners_px);
-  }
-  for (TagDetection& tag : views[3].detection.tags) {
-    auto& outline = tag.tone_curve_fits[0];
-    if (tag.id % 2 == 0) outline.corners_px = displace_corners(outline.corners_px);
-  }
-  const double expected = compute_expected_gamma(views, synthetic_board(false));
-  EXPECT_GT(std::abs(std::log(expected / 1.7)), 0.01);
-  EXPECT_GT(std::abs(std::log(expected / 2.3)), 0.01);
-  EXPECT_NEAR(estimate_and_correct_tone_curve(views, synthetic_board(false)), expected, 1e-9);
-}
-
-/// The board is warped only in the corners without a curve: the warp is estimated for all curves.
-TEST(EstimateAndCorrectToneCurve, EstimatesWarpForAllCurvesIfItIsNeededWithoutCurve) {
-  SyntheticViews flat{synthetic_board(false), synthetic_lens()}, warped = flat;
-  warped.warp_m = {0.003, -0.002};
-  Random random(11);
-  std::vector<BoardView> views;
-  for (int i = 0; i < 4; ++i) {
-    const double azimuth = 1.5 * i + 0.3;
-    const Eigen::Matrix3d rotation =
-        (Eigen::AngleAxisd(0.5, Eigen::Vector3d(std::cos(azimuth), std::sin(azimuth), 0)) *
-         Eigen::AngleAxisd(0.4 * i, Eigen::Vector3d::UnitZ()))
-            .toRotationMatrix();
-    const Eigen::Vector3d middle_m(0.01 * i, -0.01, 0.3);
-    BoardDetection seen = warped.view(rotation, middle_m, random, 0.02);
-    for (std::size_t fit = 1; fit < kGammas.size(); ++fit) {
-      const double noise_px = 0.02 + 0.01 * std::abs(static_cast<double>(fit) - 2.2);
-      const BoardDetection other = flat.view(rotation, middle_m, random, noise_px);
-      ASSERT_EQ(other.tags.size(), seen.tags.size());
-      for (std::size_t k = 0; k < seen.tags.size(); ++k) {
-        seen.tags[k].tone_curve_fits.push_back({other.tags[k].corners_px, {}, {}});
-        seen.tags[k].tone_curve_fits.back().corner_sds_px.fill(0.02);
-      }
-    }
-    for (TagDetection& tag : seen.tags) tag.corner_sds_px.fill(0.02);
-    for (const double each : kGammas) {
-      seen.curve_costs.push_back(500 * std::pow(std::log(each / 2), 2));
-    }
-    views.push_back({"image", flat.imager_px, seen});
-  }
-  ASSERT_GT(views[0].detection.tags.size(), 20U);
-  const double expected = compute_expected_gamma(views, flat.board);
-  EXPECT_NEAR(estimate_and_correct_tone_curve(views, flat.board), expected, 1e-9);
-}
-
-/// OPENCV8 does not fit a wide fisheye.
-TEST(EstimateAndCorrectToneCurve, UsesFisheyeModelIfItFitsBetter) {
-  const Lens fisheye(LensModel::fisheye,
-                     std::array{250.0, 251.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006});
-  auto views = CodedCamera{1.7, 2.3, 0.15, fisheye}.views(6, 10);
-  const double expected = compute_expected_gamma(views, synthetic_board(false), LensModel::fisheye);
-  EXPECT_NEAR(estimate_and_correct_tone_curve(views, synthetic_board(false)), expected, 1e-9);
-}
-
-/// Every fifth of 30 views is not used.
-TEST(EstimateAndCorrectToneCurve, UsesTwentyFourViewsEvenlySpaced) {
-  const Board board = synthetic_board(false);
-  auto all = CodedCamera{1.8, 2.2, 0.2}.views(30, 9);
-  for (BoardView& view : all) view.detection.tags.resize(8, view.detection.tags[0]);
-  auto used = all;
-  for (std::size_t i = 4; i < used.size(); i += 5) used[i].detection.tags.clear();
-  auto fewer = all;
-  for (std::size_t i = 3; i < fewer.size(); i += 5) fewer[i].detection.tags.clear();
-  const double gamma = estimate_and_correct_tone_curve(all, board);
-  EXPECT_EQ(estimate_and_correct_tone_curve(used, board), gamma);
-  EXPECT_NE(estimate_and_correct_tone_curve(fewer, board), gamma);
 }
 
 }  // namespace
