@@ -85,7 +85,10 @@ class HostileStation : public SmallStation {
         ")\n"
         "old = time.strftime('%Y%m%dT%H%M%SZ', past) + run[16:]\n"
         "ended = time.strftime('%Y-%m-%dT%H:%M:%SZ', past)\n"
-        "db.execute('UPDATE runs SET run = ?, ended_utc = ?', (old, ended))\n"
+        "was = db.execute('SELECT ended_utc FROM runs').fetchone()[0]\n"
+        "db.execute('UPDATE runs SET run = ?, ended_utc = ?, '\n"
+        "           'document = replace(replace(document, run, ?), ?, ?)',\n"
+        "           (old, ended, old, was, ended))\n"
         "for place, name in (('captures', '0001.'), ('results/0001', '')):\n"
         "    os.rename(f'{sys.argv[1]}/{place}/{name}{run}', "
         "f'{sys.argv[1]}/{place}/{name}{old}')\n");

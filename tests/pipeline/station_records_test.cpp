@@ -34,8 +34,11 @@ TEST_F(VlpStationRecords, CleanDeletesExpiredImagesAndKeepsRecord) {
       "past = time.gmtime(time.time() - 100 * 86400)\n"
       "old = time.strftime('%Y%m%dT%H%M%SZ', past) + run[16:]\n"
       "ended = time.strftime('%Y-%m-%dT%H:%M:%SZ', past)\n"
-      "db.execute('UPDATE runs SET run = ?, ended_utc = ?', (old, ended))\n"
-      "db.execute('UPDATE figures SET run = ?', (old,))\n"
+      "was = db.execute('SELECT ended_utc FROM runs').fetchone()[0]\n"
+      "db.execute('UPDATE runs SET run = ?, ended_utc = ?, '\n"
+      "           'document = replace(replace(document, run, ?), ?, ?)',\n"
+      "           (old, ended, old, was, ended))\n"
+      "db.execute('UPDATE metrics SET run = ?', (old,))\n"
       "db.execute('UPDATE images SET run = ?', (old,))\n"
       "os.rename(sys.argv[1] + '/captures/0001.' + run, sys.argv[1] + '/captures/0001.' + old)\n";
   const auto aged = run_program("python3 " + folder.file("age.py", client).string() + " " +
@@ -163,11 +166,9 @@ TEST_F(VlpStationRecords, TrendAndStudiesUseComparableRunsAndTrendExitsWith1ForO
       sql.append("INSERT INTO runs SELECT '").append(run).append("', '").append(kind);
       sql.append("', '").append(of).append("', '").append(camera).append("', '', '', '', '");
       sql.append("2").append(run).append("-01-01T00:00:00Z', '");  // a year each
-      sql.append(verdict).append("', '', '', '', '', '';\n");
-      sql.append(
-          "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit) VALUES (");
-      sql.append("'").append(run).append("', 1, 'rms_px', ");
-      sql.append(std::to_string(values[i])).append(", NULL, 0, 1, 'px');\n");
+      sql.append(verdict).append("', '', '', '', document FROM runs LIMIT 1;\n");
+      sql.append("INSERT INTO metrics VALUES ('").append(run).append("', 'rms_px', ");
+      sql.append(std::to_string(values[i])).append(", NULL);\n");
     }
     const auto client = folder.file("client.py",
                                     "import sqlite3, sys\n"

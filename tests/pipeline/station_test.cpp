@@ -71,7 +71,9 @@ TEST_F(VlpStation, PassesGoodUnitAndKeepsRecord) {
   const auto exported = folder / "runs.json", picture = folder / "trend.svg";
   EXPECT_EQ(records("export -o " + exported.string()).exit_code, 0);
   EXPECT_THAT(TemporaryFolder::read_content(exported), HasSubstr("vlp-calibration/1"));
-  EXPECT_EQ(problems_by_schema("runs", {exported}), "");
+  const auto runs = nlohmann::json::parse(TemporaryFolder::read_content(exported));
+  ASSERT_EQ(runs.size(), 2U);
+  EXPECT_EQ(problems_by_schema("run", {folder.file("run.json", runs[0].dump())}), "");
   EXPECT_THAT(records("trend rms_px -o " + picture.string()).output, HasSubstr("limits"));
   EXPECT_THAT(TemporaryFolder::read_content(picture), HasSubstr("<svg"));
 

@@ -356,8 +356,8 @@ void verify_records_by_audit_trail(const StationRecordsOptions& options) {
   fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
   if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
   if (found.problems.empty()) return;
-  // [STATION-8] `records were changed` | edited database, run of an older program, end of the trail
-  //   removed, or other records | compare with a backup
+  // [STATION-8] `records were changed` | edited database, end of the trail removed, or other
+  //   records | compare with a backup
   throw GateNotMet(fmt::format(
       "the records were changed: {}{}", found.problems.front(),
       found.problems.size() == 1 ? "" : fmt::format(", and {} more", found.problems.size() - 1)));

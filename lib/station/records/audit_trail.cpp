@@ -7,7 +7,7 @@
 
 #include <algorithm>
 #include <map>
-#include <tuple>
+#include <stdexcept>
 #include <utility>
 
 #include "captures/digest.h"
@@ -16,58 +16,24 @@
 namespace vlp {
 namespace {
 
-/// Concatenation of texts with their lengths, which makes it unambiguous.
-class DigestInput {
- public:
-  void add(std::string_view text) { text_ += fmt::format("{} {}\n", text.size(), text); }
-  /// Adds a number with all bits, in the same digits for every program.
-  void add(double number) { add(fmt::format("{:.17g}", number)); }
-  std::string compute_sha256() const { return compute_text_sha256(text_); }
+/// Computes the digest of texts with their lengths, which make it unambiguous.
+std::string compute_digest(const std::vector<std::string>& texts) {
+  std::string all;
+  for (const std::string& text : texts) all += fmt::format("{} {}\n", text.size(), text);
+  return compute_text_sha256(all);
+}
 
- private:
-  std::string text_;
-};
-
-/// Computes the digest of a run without its events, which have their own entries. Skips empty
-/// texts, so that texts added by later versions of the tables do not change it.
-std::string compute_digest(const RunRecord& run) {
-  DigestInput content;
-  for (const RunField& field : list_run_text_fields()) {
-    if ((run.*field.text).empty()) continue;
-    content.add(field.name);
-    content.add(run.*field.text);
+/// Computes the digest of a run, its SHA-256; empty if its rows are not those of its document.
+std::string compute_digest_of_rows(const RunRows& rows) {
+  try {
+    return rows == make_run_rows(rows.document) ? compute_text_sha256(rows.document) : "";
+  } catch (const std::runtime_error&) {  // a document that was edited
+    return "";
   }
-  for (const CheckedMetric& metric : run.metrics) {
-    content.add("figure");
-    content.add(metric.name);
-    content.add(metric.unit);
-    content.add(metric.direction == Direction::at_least ? "at least" : "at most");
-    if (metric.value) content.add(*metric.value);
-    if (metric.limit) {
-      content.add("gate");
-      content.add(*metric.limit);
-    }
-    if (!metric.guard_band) continue;
-    content.add("guard");
-    content.add(metric.guard_band->standard_uncertainty);
-    content.add(metric.guard_band->k);
-  }
-  // Databases sort names differently.
-  auto images = run.images;
-  std::ranges::sort(images, {}, [](const auto& image) { return std::tie(image.step, image.name); });
-  for (const auto& [step, name, sha256, refused] : images) {
-    content.add("image");
-    for (const std::string* text : {&step, &name, &sha256, &refused}) content.add(*text);
-  }
-  return content.compute_sha256();
 }
 
 std::string compute_digest(const std::string& run, const RunEvent& event) {
-  DigestInput content;
-  for (const std::string* text : {&run, &event.event, &event.kind, &event.author, &event.text}) {
-    content.add(*text);
-  }
-  return content.compute_sha256();
+  return compute_digest({run, event.event, event.kind, event.author, event.text});
 }
 
 struct Entry {
@@ -77,12 +43,8 @@ struct Entry {
 };
 
 std::string compute_digest(const Entry& entry, const std::string& before) {
-  DigestInput digest;
-  digest.add(std::to_string(entry.number));
-  for (const std::string* text : {&entry.run, &entry.event, &entry.content, &before}) {
-    digest.add(*text);
-  }
-  return digest.compute_sha256();
+  return compute_digest(
+      {std::to_string(entry.number), entry.run, entry.event, entry.content, before});
 }
 
 std::vector<Entry> load_entries(soci::session& sql) {
@@ -135,12 +97,11 @@ void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& pr
 
 void lock_audit_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
 
-void append_run_events_to_audit_trail(soci::session& sql, const std::string& run, bool is_new_run,
+void append_run_events_to_audit_trail(soci::session& sql, const std::string& run,
+                                      const std::string& document,
                                       const std::vector<RunEvent>& new_events) {
   std::vector<Entry> added;
-  // As read from the database, which can store a number differently than given.
-  if (is_new_run)
-    added.push_back({0, run, "", compute_digest(load_run_with_all_parts(sql, run).value()), ""});
+  if (!document.empty()) added.push_back({0, run, "", compute_text_sha256(document), ""});
   for (const RunEvent& event : new_events) {
     added.push_back({0, run, event.event, compute_digest(run, event), ""});
   }
@@ -187,10 +148,9 @@ TrailCheck check_audit_trail(soci::session& sql, const std::string& expected_dig
     }
   };
   for (const std::string& name : load_run_ids(sql)) {
-    const RunRecord run = load_run_with_all_parts(sql, name).value();
     ++check.runs;
-    check_item(name, "", compute_digest(run));
-    for (const RunEvent& event : run.events) {
+    check_item(name, "", compute_digest_of_rows(load_run_rows(sql, name)));
+    for (const RunEvent& event : load_run_events(sql, name)) {
       check_item(name, event.event, compute_digest(name, event));
     }
     on_progress();

@@ -19,8 +19,10 @@ namespace vlp {
 /// for each of its events, numbered from 1. Entries are never changed or removed.
 ///
 /// User, time, action and reason are in the run or the event. An entry has `content`, the SHA-256
-/// of the run or event, and `digest`. The latter is the SHA-256 of number, run, event and content
-/// of the entry and of the `digest` of the previous entry.
+/// of the run's document (serialize_run()) or of the event, and `digest`. The latter is the SHA-256
+/// of number, run, event and content of the entry and of the `digest` of the previous entry. That
+/// of several texts is the SHA-256 of the texts, each after its length. A run counts as changed,
+/// too, if the rows that queries use are not those of its document (make_run_rows()).
 ///
 /// Later changes, and removals from the middle, are therefore detected. Two manipulations change no
 /// existing digest: removing the last entries with their runs, and rewriting all entries. They are
@@ -30,8 +32,9 @@ namespace vlp {
 /// ends. Waits for a lock of another program. Do slow work before the call.
 void lock_audit_trail(soci::session& sql);
 /// Locks the trail and appends the entries of new events of a run, after that of the run itself if
-/// `is_new_run`.
-void append_run_events_to_audit_trail(soci::session& sql, const std::string& run, bool is_new_run,
+/// it is new: `document` is then its document, otherwise empty.
+void append_run_events_to_audit_trail(soci::session& sql, const std::string& run,
+                                      const std::string& document,
                                       const std::vector<RunEvent>& new_events);
 
 /// Result of check_audit_trail(): numbers of runs and entries, and differences.

@@ -2,85 +2,42 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "station/records/record_tables.h"
 
+#include <algorithm>
 #include <stdexcept>
-#include <string>
-#include <vector>
-
-#include "station/records/audit_trail.h"
-#include "station/records/run_record.h"
 
 namespace vlp {
 namespace {
 
-constexpr const char* kFigures =  // gate: NULL without a gate; guard_k: NULL without a guard band
-    "CREATE TABLE IF NOT EXISTS figures (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
-    "place INTEGER NOT NULL, name VARCHAR(64) NOT NULL, value DOUBLE PRECISION, "
-    "gate DOUBLE PRECISION, at_least INTEGER NOT NULL, met INTEGER NOT NULL, "
-    "unit VARCHAR(16) NOT NULL DEFAULT '', uncertainty DOUBLE PRECISION, "
-    "guard_k DOUBLE PRECISION, PRIMARY KEY (run, name))";
-
-constexpr const char* kImages =
-    "CREATE TABLE IF NOT EXISTS images (run VARCHAR(64) NOT NULL REFERENCES runs (run), "
-    "step VARCHAR(16) NOT NULL, image VARCHAR(255) NOT NULL, sha256 TEXT NOT NULL, "
-    "refused TEXT NOT NULL, PRIMARY KEY (run, step, image))";
-
-constexpr const char* kImagesByDigest =
-    "CREATE INDEX IF NOT EXISTS images_by_sha256 ON images (sha256)";
-
-constexpr const char* kEvents =
-    "CREATE TABLE IF NOT EXISTS events (event VARCHAR(64) PRIMARY KEY, "
-    "run VARCHAR(64) NOT NULL REFERENCES runs (run), what VARCHAR(32) NOT NULL, "
-    "text TEXT NOT NULL, who TEXT NOT NULL DEFAULT '')";
-
-constexpr const char* kEventsByRun = "CREATE INDEX IF NOT EXISTS events_by_run ON events (run)";
-
-/// Without a reference to runs, so that an entry remains when its run is removed.
-constexpr const char* kTrail =
-    "CREATE TABLE IF NOT EXISTS trail (number BIGINT PRIMARY KEY, run VARCHAR(64) NOT NULL, "
-    "event VARCHAR(64) NOT NULL, content TEXT NOT NULL, digest TEXT NOT NULL)";
+/// Returns the names of the columns of table `runs`, except its document.
+std::string list_column_names(const char* separator) {
+  std::string names;
+  for (const RunField& field : list_run_text_fields()) {
+    if (field.is_column) names.append(names.empty() ? "" : separator).append(field.name);
+  }
+  return names;
+}
 
 std::vector<std::string> list_table_statements() {
-  std::string runs = "CREATE TABLE IF NOT EXISTS runs (run VARCHAR(64) PRIMARY KEY";
-  for (const RunField& field : list_run_text_fields().subspan(1)) {
-    runs.append(", ").append(field.name).append(" TEXT NOT NULL");
-  }
-  runs += ")";
   return {"CREATE TABLE IF NOT EXISTS vlp_schema (version INTEGER PRIMARY KEY)",
-          runs,
-          kFigures,
-          kImages,
-          kEvents,
-          kEventsByRun,
-          kTrail,
+          "CREATE TABLE IF NOT EXISTS runs (" + list_column_names(" TEXT NOT NULL, ") +
+              " TEXT NOT NULL, document TEXT NOT NULL, PRIMARY KEY (run))",
           "CREATE INDEX IF NOT EXISTS runs_by_camera ON runs (camera)",
-          kImagesByDigest};
+          // value: NULL if it could not be measured; gate: NULL without a gate
+          "CREATE TABLE IF NOT EXISTS metrics (run TEXT NOT NULL REFERENCES runs (run), "
+          "name TEXT NOT NULL, value DOUBLE PRECISION, gate DOUBLE PRECISION, "
+          "PRIMARY KEY (run, name))",
+          "CREATE TABLE IF NOT EXISTS images (run TEXT NOT NULL REFERENCES runs (run), "
+          "sha256 TEXT NOT NULL, PRIMARY KEY (sha256, run))",
+          "CREATE TABLE IF NOT EXISTS events (event TEXT PRIMARY KEY, "
+          "run TEXT NOT NULL REFERENCES runs (run), what TEXT NOT NULL, text TEXT NOT NULL, "
+          "who TEXT NOT NULL DEFAULT '')",
+          "CREATE INDEX IF NOT EXISTS events_by_run ON events (run)",
+          // Without a reference to runs, so that an entry remains when its run is removed.
+          "CREATE TABLE IF NOT EXISTS trail (number BIGINT PRIMARY KEY, run TEXT NOT NULL, "
+          "event TEXT NOT NULL, content TEXT NOT NULL, digest TEXT NOT NULL)"};
 }
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
-
-void read_run_metrics(soci::session& sql, RunRecord& record) {
-  CheckedMetric metric;
-  double value = 0, gate = 0;
-  GuardBand guard{};
-  int at_least = 0;
-  soci::indicator has_value = soci::i_null, has_gate = soci::i_null, has_u = soci::i_null,
-                  has_k = soci::i_null;
-  soci::statement metrics =
-      (sql.prepare << "SELECT name, value, gate, at_least, unit, uncertainty, guard_k FROM figures "
-                      "WHERE run = :run ORDER BY place",
-       soci::into(metric.name), soci::into(value, has_value), soci::into(gate, has_gate),
-       soci::into(at_least), soci::into(metric.unit), soci::into(guard.standard_uncertainty, has_u),
-       soci::into(guard.k, has_k), soci::use(record.run));
-  metrics.execute();
-  while (metrics.fetch()) {
-    metric.value = has_value == soci::i_ok ? std::optional(value) : std::nullopt;
-    metric.limit = has_gate == soci::i_ok ? std::optional(gate) : std::nullopt;
-    metric.direction = at_least != 0 ? Direction::at_least : Direction::at_most;
-    const bool guarded = has_u == soci::i_ok && has_k == soci::i_ok;
-    metric.guard_band = guarded ? std::optional(guard) : std::nullopt;
-    record.metrics.push_back(metric);
-  }
-}
 
 }  // namespace
 
@@ -123,42 +80,74 @@ void create_record_tables(soci::session& sql) {
   transaction.commit();
 }
 
-std::optional<RunRecord> load_run_text_fields(soci::session& sql, const std::string& run) {
-  RunRecord record;
-  soci::statement select(sql);
-  std::string columns;
-  for (const auto& [name, text, label, in_csv] : list_run_text_fields()) {
-    columns.append(columns.empty() ? "" : ", ").append(name);
-    select.exchange(soci::into(record.*text));
+RunRows make_run_rows(std::string document) {
+  const RunRecord run = parse_run_document(document);
+  RunRows rows{std::move(document), {}, {}, {}};
+  for (const RunField& field : list_run_text_fields()) {
+    if (field.is_column) rows.columns.push_back(run.*field.text);
   }
-  select.exchange(soci::use(run, "key"));
-  select.alloc();
-  select.prepare("SELECT " + columns + " FROM runs WHERE run = :key");
-  select.define_and_bind();
-  if (!select.execute(true)) return std::nullopt;
-  return record;
+  for (const CheckedMetric& metric : run.metrics) {
+    rows.metrics[metric.name] = {metric.value, metric.limit};
+  }
+  for (const RunRecord::Image& image : run.images) {
+    if (image.is_image_used()) rows.image_sha256.insert(image.sha256);
+  }
+  return rows;
 }
 
-std::optional<RunRecord> load_run_with_all_parts(soci::session& sql, const std::string& run) {
-  std::optional<RunRecord> found = load_run_text_fields(sql, run);
-  if (!found) return found;
-  read_run_metrics(sql, *found);
-  RunRecord::Image image;
-  soci::statement images =
-      (sql.prepare << "SELECT step, image, sha256, refused FROM images WHERE run = :run ORDER "
-                      "BY step, image",
-       soci::into(image.step), soci::into(image.name), soci::into(image.sha256),
-       soci::into(image.rejection), soci::use(run));
-  images.execute();
-  while (images.fetch()) found->images.push_back(image);
+RunRows load_run_rows(soci::session& sql, const std::string& run) {
+  RunRows rows;
+  rows.columns.resize(static_cast<std::size_t>(
+      std::ranges::count_if(list_run_text_fields(), &RunField::is_column)));
+  soci::statement columns(sql);
+  for (std::string& column : rows.columns) columns.exchange(soci::into(column));
+  columns.exchange(soci::into(rows.document));
+  columns.exchange(soci::use(run, "run"));
+  columns.alloc();
+  columns.prepare("SELECT " + list_column_names(", ") + ", document FROM runs WHERE run = :run");
+  columns.define_and_bind();
+  columns.execute(true);
+  std::string name;
+  double value = 0, gate = 0;
+  soci::indicator has_value = soci::i_null, has_gate = soci::i_null;
+  soci::statement metrics =
+      (sql.prepare << "SELECT name, value, gate FROM metrics WHERE run = :run", soci::into(name),
+       soci::into(value, has_value), soci::into(gate, has_gate), soci::use(run));
+  metrics.execute();
+  while (metrics.fetch()) {
+    auto& metric = rows.metrics[name];
+    if (has_value == soci::i_ok) metric.first = value;
+    if (has_gate == soci::i_ok) metric.second = gate;
+  }
+  const soci::rowset<std::string> images =
+      (sql.prepare << "SELECT sha256 FROM images WHERE run = :run", soci::use(run));
+  rows.image_sha256.insert(images.begin(), images.end());
+  return rows;
+}
+
+std::optional<RunRecord> load_run(soci::session& sql, const std::string& run) {
+  std::string document;
+  sql << "SELECT document FROM runs WHERE run = :run", soci::into(document), soci::use(run);
+  if (!sql.got_data()) return std::nullopt;
+  try {
+    RunRecord record = parse_run_document(document);
+    record.events = load_run_events(sql, run);
+    return record;
+  } catch (const std::runtime_error& error) {
+    throw std::runtime_error("run " + run + " " + error.what());
+  }
+}
+
+std::vector<RunEvent> load_run_events(soci::session& sql, const std::string& run) {
   RunEvent event;
+  std::vector<RunEvent> loaded;
   soci::statement events =
       (sql.prepare << "SELECT event, what, who, text FROM events WHERE run = :run ORDER BY event",
        soci::into(event.event), soci::into(event.kind), soci::into(event.author),
        soci::into(event.text), soci::use(run));
   events.execute();
-  while (events.fetch()) found->events.push_back(event);
-  return found;
+  while (events.fetch()) loaded.push_back(event);
+  return loaded;
 }
 
 }  // namespace vlp

@@ -4,15 +4,19 @@
 
 #include <soci/soci.h>
 
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "station/records/run_record.h"
 
 namespace vlp {
 
 /// Version of the tables, stored in vlp_schema.
-inline constexpr int kSchemaVersion = 6;
+inline constexpr int kSchemaVersion = 7;
 
 /// Returns true if the database has the tables. Takes no lock, so that users without write
 /// permission can call it.
@@ -27,11 +31,31 @@ inline constexpr int kTableLockId = 0x766c70;
 /// for tables of another version.
 void create_record_tables(soci::session& sql);
 
-/// Loads the texts of a run (list_run_text_fields()) from tables of the current version;
-/// std::nullopt if no run has this id. Throws soci::soci_error.
-std::optional<RunRecord> load_run_text_fields(soci::session& sql, const std::string& run);
-/// Loads a run with its metrics, images and events, with the names of metrics as they were stored;
-/// std::nullopt if no run has this id.
-std::optional<RunRecord> load_run_with_all_parts(soci::session& sql, const std::string& run);
+/// Rows of a run: its document, and the values of it that queries use.
+struct RunRows {
+  /// serialize_run().
+  std::string document;
+  /// Row of table `runs`: list_run_text_fields() with RunField::is_column.
+  std::vector<std::string> columns;
+  /// Rows of table `metrics`: value and gate, if any, by name.
+  std::map<std::string, std::pair<std::optional<double>, std::optional<double>>> metrics;
+  /// Rows of table `images`: digests of the used images.
+  std::set<std::string> image_sha256;
+
+  friend bool operator==(const RunRows&, const RunRows&) = default;
+};
+
+/// Makes the rows of a run from its document.
+/// @throws std::runtime_error as parse_run_document()
+RunRows make_run_rows(std::string document);
+/// Loads the rows of a run. Throws soci::soci_error.
+/// @pre the run exists
+RunRows load_run_rows(soci::session& sql, const std::string& run);
+
+/// Loads a run from its document, with its events; std::nullopt if no run has this id. Throws
+/// soci::soci_error, and std::runtime_error as parse_run_document().
+std::optional<RunRecord> load_run(soci::session& sql, const std::string& run);
+/// Loads the events of a run, in chronological order.
+std::vector<RunEvent> load_run_events(soci::session& sql, const std::string& run);
 
 }  // namespace vlp

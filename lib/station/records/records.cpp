@@ -227,41 +227,42 @@ namespace {
 /// Factor of the time limit for many rows: the server collects them before it sends the first one.
 constexpr int kManyRowsTimeoutFactor = 10;
 
-bool have_same_texts(const RunRecord& a, const RunRecord& b) {
-  return std::ranges::all_of(list_run_text_fields(),
-                             [&](const RunField& field) { return a.*field.text == b.*field.text; });
-}
-
-void insert_metrics(soci::session& sql, const RunRecord& record, ConnectionWatchdog& watch) {
-  int place = 0;
-  for (const CheckedMetric& metric : record.metrics) {
-    const double value = metric.value.value_or(0), gate = metric.limit.value_or(0);
-    soci::indicator has_value = metric.value ? soci::i_ok : soci::i_null;
-    soci::indicator has_gate = metric.limit ? soci::i_ok : soci::i_null;
-    const auto [uncertainty, guard_k] = metric.guard_band.value_or(GuardBand{});
-    soci::indicator has_guard = metric.guard_band ? soci::i_ok : soci::i_null;
-    const int at_least = metric.direction == Direction::at_least ? 1 : 0,
-              passed = metric.has_passed_gate() ? 1 : 0;
-    ++place;
-    sql << "INSERT INTO figures (run, place, name, value, gate, at_least, met, unit, uncertainty, "
-           "guard_k) VALUES (:run, :place, :name, :value, :gate, :at_least, :met, :unit, "
-           ":uncertainty, :guard_k)",
-        soci::use(record.run), soci::use(place), soci::use(metric.name),
-        soci::use(value, has_value), soci::use(gate, has_gate), soci::use(at_least),
-        soci::use(passed), soci::use(metric.unit), soci::use(uncertainty, has_guard),
-        soci::use(guard_k, has_guard);
+/// Stores the rows of a run. Returns false if the run exists.
+bool insert_run(soci::session& sql, const std::string& run, const RunRows& rows,
+                ConnectionWatchdog& watch) {
+  soci::statement insert(sql);
+  std::string places;
+  for (const std::string& column : rows.columns) {
+    places.append(":c").append(std::to_string(places.size())).append(", ");
+    insert.exchange(soci::use(column));
+  }
+  insert.exchange(soci::use(rows.document));
+  insert.alloc();
+  insert.prepare("INSERT INTO runs VALUES (" + places + ":document) ON CONFLICT (run) DO NOTHING");
+  insert.define_and_bind();
+  insert.execute(true);
+  watch.on_progress();
+  if (insert.get_affected_rows() == 0) return false;
+  for (const auto& [name, metric] : rows.metrics) {
+    const double value = metric.first.value_or(0), gate = metric.second.value_or(0);
+    soci::indicator has_value = metric.first ? soci::i_ok : soci::i_null,
+                    has_gate = metric.second ? soci::i_ok : soci::i_null;
+    sql << "INSERT INTO metrics VALUES (:run, :name, :value, :gate)", soci::use(run),
+        soci::use(name), soci::use(value, has_value), soci::use(gate, has_gate);
     watch.on_progress();
   }
-}
-
-void insert_images(soci::session& sql, const RunRecord& record, ConnectionWatchdog& watch) {
-  for (const auto& [step, name, sha256, refused] : record.images) {
-    sql << "INSERT INTO images (run, step, image, sha256, refused) VALUES (:run, :step, :image, "
-           ":sha256, :refused)",
-        soci::use(record.run), soci::use(step), soci::use(name), soci::use(sha256),
-        soci::use(refused);
+  for (const std::string& sha256 : rows.image_sha256) {
+    sql << "INSERT INTO images VALUES (:run, :sha256)", soci::use(run), soci::use(sha256);
     watch.on_progress();
   }
+  return true;
+}
+
+/// Returns true if the stored run has this document. A stored one is written again first, because
+/// another version of the program can have written it.
+bool has_stored_document(soci::session& sql, const std::string& run, const std::string& document) {
+  const auto kept = load_run(sql, run);
+  return kept && serialize_run(*kept) == document;
 }
 
 /// Stores the new events, and returns them.
@@ -308,8 +309,7 @@ std::string bind_filter(soci::statement& statement, const RunFilter& filter) {
   add(filter.since, "runs.ended_utc >= :since");
   add(filter.until, "runs.ended_utc < :until");
   add(filter.image_sha256,
-      "runs.run IN (SELECT images.run FROM images WHERE images.sha256 = :sha256 AND "
-      "images.refused = '')");
+      "runs.run IN (SELECT images.run FROM images WHERE images.sha256 = :sha256)");
   return filter.has_open_hook ? text + " AND " + kHookOpen : text;
 }
 
@@ -366,34 +366,19 @@ Records::~Records() = default;
 void Records::store_run(const RunRecord& record) {
   database_->run([&](ConnectionWatchdog& watch) {
     soci::session& sql = database_->sql;
+    const RunRecord escaped = escape_texts_of_run(record);
+    const RunRows rows = make_run_rows(serialize_run(escaped));
     soci::transaction transaction(sql);
     // Writes first, so that the transaction waits for others before it reads.
-    soci::statement insert(sql);
-    std::string columns, places;
-    for (const auto& [name, text, label, in_csv] : list_run_text_fields()) {
-      columns.append(columns.empty() ? "" : ", ").append(name);
-      places.append(places.empty() ? ":" : ", :").append(name);
-      insert.exchange(soci::use(record.*text, name));
-    }
-    insert.alloc();
-    insert.prepare("INSERT INTO runs (" + columns + ") VALUES (" + places +
-                   ") ON CONFLICT (run) DO NOTHING");
-    insert.define_and_bind();
-    insert.execute(true);
-    watch.on_progress();
-    const bool is_new = insert.get_affected_rows() > 0;
-    if (is_new) {
-      insert_metrics(sql, record, watch);
-      insert_images(sql, record, watch);
-    } else if (const auto kept = load_run_text_fields(sql, record.run);
-               !kept || !have_same_texts(*kept, record)) {
+    const bool is_new = insert_run(sql, escaped.run, rows, watch);
+    if (!is_new && !has_stored_document(sql, escaped.run, rows.document)) {
       // [STATION-15] `has another run` | records or results edited, or two of one name; nothing is
       //   overwritten | compare both
-      throw InputError(database_->name, "has another run " + record.run);
+      throw InputError(database_->name, "has another run " + escaped.run);
     }
-    const auto new_events = insert_events(sql, record, watch);
+    const auto new_events = insert_events(sql, escaped, watch);
     // Last, because all stations that share the records wait for it.
-    append_run_events_to_audit_trail(sql, record.run, is_new, new_events);
+    append_run_events_to_audit_trail(sql, escaped.run, is_new ? rows.document : "", new_events);
     transaction.commit();
   });
 }
@@ -425,10 +410,10 @@ std::vector<TrendPoint> Records::load_metric_trend(const std::string& metric,
                                                    const RunFilter& filter) {
   using Point = TrendPoint;
   constexpr const char* select =
-      "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, figures.value "
-      "FROM runs JOIN figures ON figures.run = runs.run ";
+      "SELECT runs.run, runs.station, runs.camera, runs.verdict, runs.ended_utc, metrics.value "
+      "FROM runs JOIN metrics ON metrics.run = runs.run ";
   const std::string end = " AND " + kNotVoided +
-                          " AND figures.name = :figure AND figures.value IS NOT NULL "
+                          " AND metrics.name = :metric AND metrics.value IS NOT NULL "
                           "ORDER BY runs.ended_utc, runs.run";
   return database_->run(
       [&](ConnectionWatchdog&) {
@@ -441,8 +426,7 @@ std::vector<TrendPoint> Records::load_metric_trend(const std::string& metric,
 }
 
 std::optional<RunRecord> Records::find_run_by_id(const std::string& run) {
-  return database_->run(
-      [&](ConnectionWatchdog&) { return load_run_with_all_parts(database_->sql, run); });
+  return database_->run([&](ConnectionWatchdog&) { return load_run(database_->sql, run); });
 }
 
 TrailCheck Records::check_records_by_audit_trail(const std::string& expected_digest) {

@@ -276,8 +276,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kDigits = 9;
-constexpr const char* kRunFormat = "vlp-run/2";
-constexpr std::size_t kMaxRunFileBytes = 64 << 20;
+constexpr const char* kRunFormat = "vlp-run/3";
+constexpr std::size_t kMaxDocumentBytes = 64 << 20;
 
 std::string join_lines(std::string text) {
   while (text.ends_with('\n')) text.pop_back();
@@ -302,14 +302,14 @@ void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& 
   const auto kinds = list_columns(runs);
   std::vector<std::string> header;
   for (const RunField& field : list_run_text_fields()) {
-    if (field.in_csv) header.emplace_back(field.name);
+    if (field.is_column) header.emplace_back(field.name);
   }
   for (const MetricKind& kind : kinds) header.emplace_back(kind.name);
   CsvWriter csv(file, header);
   for (const RunRecord& run : runs) {
     std::vector<std::string> row;
     for (const RunField& field : list_run_text_fields()) {
-      if (field.in_csv) row.push_back(join_lines(run.*field.text));
+      if (field.is_column) row.push_back(join_lines(run.*field.text));
     }
     for (const MetricKind& kind : kinds) {
       const CheckedMetric* metric = run.find_metric_by_name(kind.name);
@@ -325,19 +325,38 @@ Json json_number_or_null(const std::optional<double>& value) {
   return value ? Json(*value) : Json();
 }
 
-void add_guard_band(const CheckedMetric& metric, Json& json) {
-  if (!metric.guard_band) return;
-  json["uncertainty"] = metric.guard_band->standard_uncertainty;
-  json["guard_k"] = metric.guard_band->k;
+std::optional<double> read_optional_number(const Json& json) {
+  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
 }
 
-/// Adds the images and the events of a run.
-void add_images_and_events(const RunRecord& run, Json& json) {
+Json make_run_json(const RunRecord& run) {
+  Json json;
+  json["format"] = kRunFormat;
+  for (const RunField& field : list_run_text_fields()) json[field.name] = run.*field.text;
+  json["metrics"] = Json::object();
+  for (const CheckedMetric& metric : run.metrics) {
+    Json& entry = json["metrics"][metric.name];
+    entry = {{"value", json_number_or_null(metric.value)},
+             {"unit", metric.unit},
+             {"gate", json_number_or_null(metric.limit)},
+             {"at_least", metric.direction == Direction::at_least},
+             {"passed", metric.has_passed_gate()}};
+    if (!metric.guard_band) continue;
+    entry["uncertainty"] = metric.guard_band->standard_uncertainty;
+    entry["guard_k"] = metric.guard_band->k;
+    entry["conformance_probability"] = json_number_or_null(metric.conformance_probability());
+  }
   json["images"] = Json::array();
   for (const auto& [step, name, sha256, refused] : run.images) {
     json["images"].push_back(
         {{"step", step}, {"image", name}, {"sha256", sha256}, {"rejection", refused}});
   }
+  return json;
+}
+
+/// Returns the document of a run, with its events.
+Json make_run_json_with_events(const RunRecord& run) {
+  Json json = make_run_json(run);
   json["events"] = Json::array();
   for (const RunEvent& event : run.events) {
     json["events"].push_back({{"event", event.event},
@@ -345,129 +364,105 @@ void add_images_and_events(const RunRecord& run, Json& json) {
                               {"text", event.text},
                               {"who", event.author}});
   }
-}
-
-Json make_run_json(const RunRecord& run) {
-  Json json;
-  for (const RunField& field : list_run_text_fields()) {
-    json[field.name] = field.in_csv ? join_lines(run.*field.text) : run.*field.text;
-  }
-  json["metrics"] = Json::object();
-  for (const CheckedMetric& metric : run.metrics) {
-    Json& figure = json["metrics"][metric.name];
-    figure = {{"value", json_number_or_null(metric.value)},
-              {"unit", metric.unit},
-              {"gate", json_number_or_null(metric.limit)},
-              {"at_least", metric.direction == Direction::at_least},
-              {"passed", metric.has_passed_gate()}};
-    add_guard_band(metric, figure);
-    if (metric.guard_band) {
-      figure["conformance_probability"] = json_number_or_null(metric.conformance_probability());
-    }
-  }
-  add_images_and_events(run, json);
   return json;
 }
 
-std::optional<double> read_optional_number(const Json& json) {
-  return json.is_null() ? std::nullopt : std::optional(json.get<double>());
-}
-
-std::optional<GuardBand> read_guard_band(const Json& metric) {
-  if (!metric.contains("guard_k")) return std::nullopt;
-  return GuardBand{metric.at("uncertainty").get<double>(), metric.at("guard_k").get<double>()};
-}
-
-SpooledRun parse_run(const Json& json) {
-  const auto format = json.at("format").get<std::string>();
-  if (format != kRunFormat) throw std::runtime_error("another format");
-  SpooledRun spooled;
-  json.at("records").get_to(spooled.records);
-  RunRecord& run = spooled.run;
-  for (const RunField& field : list_run_text_fields()) {
-    run.*field.text = json.value(field.name, std::string());
-  }
-  // [STATION-12] `no verdict`, `is no id`
+RunRecord parse_run(const Json& json) {
+  if (json.at("format") != kRunFormat) throw std::runtime_error("another format");
+  RunRecord run;
+  for (const RunField& field : list_run_text_fields()) json.at(field.name).get_to(run.*field.text);
+  // [STATION-12] `no verdict`
   if (run.run.empty() || run.verdict.empty()) throw std::runtime_error("no run, or no verdict");
-  // Both name folders and files.
-  for (const std::string& id : {run.run, run.camera}) {
-    if (!Id::is_valid_name_of_camera_or_run(id))
-      throw std::runtime_error("its run or camera is no id");
-  }
-  for (const Json& metric : json.at("metrics")) {
+  for (const auto& [name, metric] : json.at("metrics").items()) {
     run.metrics.push_back(
-        {metric.at("name"), metric.at("unit"), read_optional_number(metric.at("value")),
+        {name,
+         metric.at("unit"),
+         read_optional_number(metric.at("value")),
          read_optional_number(metric.at("gate")),
          metric.at("at_least").get<bool>() ? Direction::at_least : Direction::at_most,
-         read_guard_band(metric)});
+         {}});
+    if (!metric.contains("guard_k")) continue;
+    run.metrics.back().guard_band =
+        GuardBand{metric.at("uncertainty").get<double>(), metric.at("guard_k").get<double>()};
   }
   for (const Json& image : json.at("images")) {
     run.images.push_back(
         {image.at("step"), image.at("image"), image.at("sha256"), image.at("rejection")});
   }
-  for (const Json& event : json.value("events", Json::array())) {
-    run.events.push_back(
-        {event.at("event"), event.at("what"), event.at("text"), event.value("who", "")});
-    if (!Id::is_valid_name_of_camera_or_run(run.events.back().event))
-      throw std::runtime_error("an event is no id");
-  }
-  return spooled;
+  return run;
 }
 
 /// Serializes JSON; replaces bytes that are no UTF-8.
-std::string serialize(const Json& json) {
-  constexpr int indent = 1;
-  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+std::string serialize(const Json& json, int indent) {
+  return json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace) +
+         (indent < 0 ? "" : "\n");
 }
 
 }  // namespace
 
-std::string serialize_spooled_run(const SpooledRun& spooled) {
-  const RunRecord run = escape_texts_of_run(spooled.run);
-  Json json;
-  json["format"] = kRunFormat;
-  json["records"] = escape_text_for_single_line(spooled.records);
-  for (const RunField& field : list_run_text_fields()) json[field.name] = run.*field.text;
-  json["metrics"] = Json::array();
-  for (const CheckedMetric& metric : run.metrics) {
-    json["metrics"].push_back({{"name", metric.name},
-                               {"unit", metric.unit},
-                               {"value", json_number_or_null(metric.value)},
-                               {"gate", json_number_or_null(metric.limit)},
-                               {"at_least", metric.direction == Direction::at_least}});
-    add_guard_band(metric, json["metrics"].back());
+std::string serialize_run(const RunRecord& run) {
+  return serialize(make_run_json(escape_texts_of_run(run)), -1);
+}
+
+RunRecord parse_run_document(const std::string& document) {
+  try {
+    if (document.size() > kMaxDocumentBytes) throw std::runtime_error("it has more than 64 MiB");
+    check_json_size_and_depth(document);
+    return parse_run(Json::parse(document));
+  } catch (const std::exception& error) {
+    // [STATION-12] `no run of a station` | a run of the spool or the records was edited by hand |
+    //   compare with a backup
+    throw std::runtime_error(std::string("is no run of a station: ") + error.what());
   }
-  add_images_and_events(run, json);
-  return serialize(json);
+}
+
+std::string serialize_spooled_run(const SpooledRun& spooled) {
+  Json json;
+  json["records"] = escape_text_for_single_line(spooled.records);
+  json.update(make_run_json_with_events(escape_texts_of_run(spooled.run)));
+  return serialize(json, 1);
 }
 
 SpooledRun read_spooled_run(const std::filesystem::path& file) {
   const auto text = SharedFolder(file.parent_path())
-                        .read_file_if_exists(file.filename().string(), kMaxRunFileBytes);
+                        .read_file_if_exists(file.filename().string(), kMaxDocumentBytes);
   // [FILE-1]
   if (!text) throw InputError(file, "cannot be opened: it was removed");
   try {
-    check_json_size_and_depth(*text);
-    return parse_run(Json::parse(*text));
+    SpooledRun spooled{parse_run_document(*text), ""};
+    const Json json = Json::parse(*text);
+    json.at("records").get_to(spooled.records);
+    // [STATION-12] `is no id`. Both name folders and files.
+    for (const std::string& id : {spooled.run.run, spooled.run.camera}) {
+      if (!Id::is_valid_name_of_camera_or_run(id))
+        throw std::runtime_error("is no run of a station: its run or camera is no id");
+    }
+    for (const Json& event : json.at("events")) {
+      spooled.run.events.push_back(
+          {event.at("event"), event.at("what"), event.at("text"), event.at("who")});
+      if (!Id::is_valid_name_of_camera_or_run(spooled.run.events.back().event))
+        throw std::runtime_error("is no run of a station: an event is no id");
+    }
+    return spooled;
   } catch (const std::exception& error) {
-    // [STATION-12] `no run of a station` | foreign or damaged file of the spool | move it away
-    throw InputError(file, std::string("is no run of a station: ") + error.what());
+    throw InputError(file, error.what());
   }
 }
 
 std::string format_hook_json(const RunRecord& run) {
   Json json;
   json["event"] = find_voiding_event(run) != nullptr ? "voided" : "verdict";
-  json.update(make_run_json(run));
-  return serialize(json);
+  json.update(make_run_json_with_events(escape_texts_of_run(run)));
+  return serialize(json, 1);
 }
 
 void export_runs_to_file(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
   if (file.extension() == ".csv") return write_csv(file, runs);
   if (file.extension() != ".json") throw InputError(file, "should end in .csv or .json");
   Json all = Json::array();
-  for (const RunRecord& run : runs) all.push_back(make_run_json(run));
-  write_file(file, serialize(all));
+  for (const RunRecord& run : runs)
+    all.push_back(make_run_json_with_events(escape_texts_of_run(run)));
+  write_file(file, serialize(all, 1));
 }
 
 }  // namespace vlp

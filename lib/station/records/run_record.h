@@ -115,14 +115,14 @@ std::ptrdiff_t find_index_of_last_event_of_kind(const RunRecord& record, const c
 /// latter shows that the record was edited.
 std::string describe_why_verdict_is_void_or_edited(const RunRecord& record);
 
-/// Text member of a record: a column of the table of runs and a key of its JSON.
+/// Text member of a record: a key of its document.
 struct RunField {
   const char* name;
   std::string RunRecord::*text;
   /// Label in the last lines of `show`; null if `show` prints the text elsewhere or not at all.
   const char* label = nullptr;
-  /// True if the CSV of runs has a column for it. Such a text is a single line in JSON, too.
-  bool in_csv = true;
+  /// True if the table of runs and the CSV have a column for it.
+  bool is_column = true;
 };
 
 /// Returns all text members of a record, in order. A new text requires a member of RunRecord, an
@@ -164,34 +164,38 @@ RunRecord make_common_run_record(const char* kind, const StationConfig& config,
 /// Returns OpenCV, Ceres, mrcal and other libraries with their versions.
 std::string list_library_versions();
 
+/// Serializes a run without its events as a JSON document of one line, format `vlp-run/3`
+/// (datasets/schemas/run.schema.json). Records store this text, and its SHA-256 is the digest of
+/// the run. Its texts are those of escape_texts_of_run().
+std::string serialize_run(const RunRecord& run);
+/// Reads a document of serialize_run().
+/// @throws std::runtime_error if the text is no such document, has no run or verdict, or exceeds
+///   check_json_size_and_depth() or 64 MiB
+RunRecord parse_run_document(const std::string& document);
+
 /// Run and derive_database_identity() of the records that it belongs to.
 struct SpooledRun {
   RunRecord run;
   std::string records;
 };
 
-/// Serializes a run as JSON text in format `vlp-run/2`. The object has "records" (identity of its
-/// database), the texts of list_run_text_fields(), "metrics", "images" and "events".
-/// Metrics with a guard band have "uncertainty" and "guard_k". Control characters and bytes that
-/// are not UTF-8 are escaped (escape_texts_of_run()).
+/// Serializes a run as JSON text: "records" (identity of its database), the members of
+/// serialize_run(), and "events".
 std::string serialize_spooled_run(const SpooledRun& spooled);
-/// Reads a run in the format of serialize_spooled_run(). A missing text of list_run_text_fields()
-/// is empty. Throws InputError with the file. Also throws it for a
-/// run without a verdict, or if the name of run, camera or event is not a valid Id.
+/// Reads a run in the format of serialize_spooled_run(). Throws InputError with the file. Also
+/// throws it for a run without a verdict, or if the name of run, camera or event is not a valid Id.
 SpooledRun read_spooled_run(const std::filesystem::path& file);
 
-/// Returns a run as a JSON object for the hook: "event" ("verdict", or "voided" for a voided run),
-/// then the members written by export_runs_to_file().
+/// Returns the JSON for the hook: "event" ("verdict", or "voided" for a voided run), then the
+/// members of serialize_run(), and "events".
 std::string format_hook_json(const RunRecord& run);
 
 /// Writes runs atomically, in the format of the file's extension. Throws InputError, also for
 /// another extension.
 ///
-///   .csv   one row per run: the texts of list_run_text_fields() with RunField::in_csv, and one
+///   .csv   one row per run: the texts of list_run_text_fields() with RunField::is_column, and one
 ///          column per metric, empty if missing
-///   .json  list of objects: the texts of list_run_text_fields(), "metrics", "images" and "events".
-///          "metrics" has value, unit, gate and result of the gate of each metric by its name. With
-///          a guard band it also has its uncertainty, factor and conformance probability.
+///   .json  list of the documents of serialize_run(), each with "events"
 void export_runs_to_file(const std::filesystem::path& file, const std::vector<RunRecord>& runs);
 
 }  // namespace vlp

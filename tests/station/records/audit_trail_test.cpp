@@ -43,20 +43,24 @@ struct Forgery {
 };
 
 const std::vector<Forgery>& forgeries() {
-  static const std::string without_3 = "DELETE FROM figures WHERE run = '" + kRun3 +
+  static const std::string without_3 = "DELETE FROM metrics WHERE run = '" + kRun3 +
                                        "';\nDELETE FROM images WHERE run = '" + kRun3 +
                                        "';\nDELETE FROM events WHERE run = '" + kRun3 +
                                        "';\nDELETE FROM runs WHERE run = '" + kRun3 + "';\n";
   static const std::vector<Forgery> all{
       {"UPDATE runs SET verdict = 'PASS', causes = '' WHERE run = '" + kRun3 + "';\n",
        {"run " + kRun3 + " was changed"}},
-      {"UPDATE figures SET value = 0.3333 WHERE run = '" + kRun2 + "' AND name = 'rms_px';\n",
+      {"UPDATE metrics SET value = 0.3333 WHERE run = '" + kRun2 + "' AND name = 'rms_px';\n",
        {"run " + kRun2 + " was changed"}},
-      {"UPDATE figures SET gate = 2 WHERE run = '" + kRun3 + "' AND name = 'rms_px';\n",
+      {"UPDATE metrics SET gate = 2 WHERE run = '" + kRun3 + "' AND name = 'rms_px';\n",
        {"run " + kRun3 + " was changed"}},
-      {"UPDATE images SET sha256 = 'another' WHERE run = '" + kRun1 + "' AND step = 'check';\n",
+      {"UPDATE images SET sha256 = 'another' WHERE run = '" + kRun1 + "';\n",
        {"run " + kRun1 + " was changed"}},
-      {"DELETE FROM images WHERE run = '" + kRun1 + "' AND step = 'check';\n",
+      {"DELETE FROM images WHERE run = '" + kRun1 + "';\n", {"run " + kRun1 + " was changed"}},
+      {"UPDATE runs SET document = replace(document, 'too dark', '') WHERE run = '" + kRun1 +
+           "';\n",
+       {"run " + kRun1 + " was changed"}},
+      {"UPDATE runs SET document = '{' WHERE run = '" + kRun1 + "';\n",
        {"run " + kRun1 + " was changed"}},
       {"UPDATE events SET who = 'Bob' WHERE event = '" + kLabel + "';\n",
        {"event " + kLabel + " of run " + kRun2 + " was changed"}},

@@ -43,7 +43,7 @@ RunRecord with_all_texts() {
 }
 
 void check_all_texts(Records& records) {
-  const RunRecord kept = with_all_texts();
+  const RunRecord kept = escape_texts_of_run(with_all_texts());
   records.store_run(kept);
   const auto found = records.find_run_by_id(kept.run);
   ASSERT_TRUE(found);
@@ -199,7 +199,7 @@ std::string read_state(const std::string& where) {
                                              "information_schema.columns WHERE table_schema = "
                                              "'public' ORDER BY table_name, ordinal_position;"
                                            : "SELECT sql FROM sqlite_master ORDER BY name;") +
-                 "\nSELECT * FROM vlp_schema;\nSELECT * FROM figures ORDER BY place;\n");
+                 "\nSELECT * FROM vlp_schema;\nSELECT * FROM metrics ORDER BY name;\n");
 }
 
 /// Checks that a database of another version is rejected and unchanged.
@@ -371,7 +371,7 @@ TEST(ExportRunsToFile, WritesMetricsAndSelectedTextsAsCsv) {
   EXPECT_THAT(csv, HasSubstr("; second"));
   for (const RunField& field : list_run_text_fields()) {
     const std::string text = std::string("the '") + field.name + "' of ";
-    EXPECT_EQ(csv.find(text) != std::string::npos, field.in_csv) << field.name;
+    EXPECT_EQ(csv.find(text) != std::string::npos, field.is_column) << field.name;
   }
   EXPECT_THAT(rejection_message([&] { export_runs_to_file(folder / "runs.txt", {}); }),
               HasSubstr(".csv"));
@@ -391,9 +391,9 @@ TEST(ExportRunsToFile, WritesMetricsImagesAndAllTextsAsJson) {
   const auto runs = nlohmann::ordered_json::parse(TemporaryFolder::read_content(file));
   ASSERT_THAT(runs, SizeIs(2));
   EXPECT_THAT(list_keys(runs[0]),
-              ElementsAre("run", "kind", "station", "camera", "operator_name", "shift", "begun_utc",
-                          "ended_utc", "verdict", "causes", "program", "libraries", "config_sha256",
-                          "calibration", "metrics", "images", "events"));
+              ElementsAre("format", "run", "kind", "station", "camera", "operator_name", "shift",
+                          "begun_utc", "ended_utc", "verdict", "causes", "program", "libraries",
+                          "config_sha256", "calibration", "metrics", "images", "events"));
   const auto& metrics = runs[0]["metrics"];
   EXPECT_THAT(list_keys(metrics), ElementsAre("rms_px", "coverage", "tilt_deg"));
   EXPECT_THAT(list_keys(metrics["tilt_deg"]),
@@ -414,22 +414,26 @@ TEST(ExportRunsToFile, WritesMetricsImagesAndAllTextsAsJson) {
   }
 }
 
-TEST(ExportRunsToFile, JsonOfRunsAndSpoolMatchesSchemas) {
+TEST(SerializeRun, DocumentsExportsAndHookMatchSchema) {
   const TemporaryFolder folder;
-  const auto file = folder / "runs.json";
   RunRecord golden = make_sample_record(numbered_run_id(2), "b", 1.5);
   golden.kind = "golden";
   RunRecord invalid = make_sample_record(numbered_run_id(3), "c", 1.5);
   invalid.verdict = verdict_name(Verdict::invalid);
-  export_runs_to_file(file, {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid});
-  EXPECT_EQ(problems_by_schema("runs", {file}), "");
-  std::vector<std::filesystem::path> waiting;
-  for (const RunRecord& run :
-       {make_sample_record(numbered_run_id(1), "a", 0.25), golden, invalid}) {
-    waiting.push_back(
-        folder.file(run.camera + ".json", serialize_spooled_run({run, "records.db"})));
+  invalid.events = {make_run_event_now(kVoided, "wrong serial", "Ann")};
+  const std::vector<RunRecord> runs{make_sample_record(numbered_run_id(1), "a", 0.25), golden,
+                                    invalid};
+  export_runs_to_file(folder / "runs.json", runs);
+  const auto exported = nlohmann::json::parse(TemporaryFolder::read_content(folder / "runs.json"));
+  ASSERT_THAT(exported, SizeIs(runs.size()));
+  std::vector<std::filesystem::path> files;
+  for (std::size_t i = 0; i < runs.size(); ++i) {
+    const std::string& name = runs[i].camera;
+    files.push_back(folder.file(name + ".json", serialize_run(runs[i])));
+    files.push_back(folder.file(name + "-hook.json", format_hook_json(runs[i])));
+    files.push_back(folder.file(name + "-exported.json", exported[i].dump()));
   }
-  EXPECT_EQ(problems_by_schema("run", waiting), "");
+  EXPECT_EQ(problems_by_schema("run", files), "");
 }
 
 }  // namespace

@@ -80,7 +80,7 @@ TEST(ReadSpooledRun, ThrowsWithFileNameForInvalidRun) {
   const std::string text = serialize_spooled_run({numbered_run(1), "records.db"});
   for (const std::string& bad :
        {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
-        std::string(text).replace(text.find("vlp-run/2"), 9, "vlp-run/3"),
+        std::string(text).replace(text.find("vlp-run/3"), 9, "vlp-run/2"),
         std::string(text).replace(text.find("\"metrics\""), 9, "\"metricz\"")}) {
     EXPECT_THAT(rejection_message([&] { read_spooled_run(folder.file("bad.json", bad)); }),
                 HasSubstr("bad.json: is no run of a station"));
