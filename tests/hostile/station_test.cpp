@@ -93,10 +93,10 @@ class HostileStation : public SmallStation {
         "    os.rename(f'{sys.argv[1]}/{place}/{name}{run}', "
         "f'{sys.argv[1]}/{place}/{name}{old}')\n");
   }
-  /// Writes a run with other texts to the spool.
+  /// Stores a run in the outbox, and replaces a text of its document.
   void spool(const std::string& from, const std::string& to) const {
     RunRecord run;
-    run.run = "20261121T134501Z-0123456789abcdef";
+    run.run = kSpooledRun;
     run.kind = "unit";
     run.station = "station-1";
     run.camera = "0001";
@@ -104,11 +104,22 @@ class HostileStation : public SmallStation {
     run.verdict = "INVALID";
     run.causes = "no images\n";
     run.calibration = "format: vlp-calibration/1\n";
-    std::string text =
-        serialize_spooled_run({run, derive_database_identity((home / "records.db").string())});
+    std::string text = serialize_run(run);
     const auto at = text.find(from);
     ASSERT_NE(at, std::string::npos) << from;
-    write("spool/a.json", text.replace(at, from.size(), to));
+    spool(run, text.replace(at, from.size(), to));
+  }
+  /// Stores a run in the outbox with another document.
+  void spool(const RunRecord& run, const std::string& document) const {
+    Records((home / "spool/outbox.db").string())
+        .store_run(run, derive_database_identity((home / "records.db").string()));
+    write("document", document);
+    python(
+        "import os, sqlite3, sys\n"
+        "db = sqlite3.connect(sys.argv[1] + '/spool/outbox.db', isolation_level=None)\n"
+        "document = open(sys.argv[1] + '/document').read()\n"
+        "db.execute('UPDATE runs SET document = ?', (document,))\n"
+        "os.remove(sys.argv[1] + '/document')\n");
   }
   /// Expects that the other user's files, and all files next to the station, are unchanged.
   void expect_nothing_outside() const {
@@ -121,7 +132,7 @@ class HostileStation : public SmallStation {
     EXPECT_TRUE(fs::is_empty(elsewhere));
   }
 
-  const std::string kMine = "mine\n";
+  const std::string kMine = "mine\n", kSpooledRun = "20261121T134501Z-0123456789abcdef";
   const fs::path home = folder / "station", elsewhere = folder / "elsewhere",
                  mine = folder.file("mine.txt", kMine);
 };
@@ -236,31 +247,40 @@ const std::vector<StationTrial> kFolderTrials{
     {"SpooledRunOfACameraOutside",
      [](const HostileStation& s) {
        s.empty_run();
-       s.spool("\"camera\": \"0001\"", "\"camera\": \"../..\"");
-       return s.vlp_station("restore 20261121T134501Z-0123456789abcdef");
+       s.spool("\"camera\":\"0001\"", "\"camera\":\"../..\"");
+       return s.vlp_station("restore " + s.kSpooledRun);
      },
-     2, "spool/a.json: is no run of a station: its run or camera is no id"},
-    {"SpooledRunIsAPipe",
+     2, "'../..' is no id of a camera"},
+    {"OutboxIsAPipe",
      [](const HostileStation& s) {
        s.empty_run();
-       ::mkfifo(s.in_folder("spool/a.json").c_str(), 0600);
+       fs::remove(s.home / "spool/outbox.db");
+       ::mkfifo(s.in_folder("spool/outbox.db").c_str(), 0600);
        return s.vlp_station("list");
      },
-     0, "spool/a.json: is no regular file", expect_no_forged_line},
-    {"SpooledRunIsALinkToADevice",
+     0, "spool/outbox.db: is no regular file", expect_no_forged_line},
+    {"OutboxIsALinkToADevice",
      [](const HostileStation& s) {
        s.empty_run();
-       s.link("spool/a.json", "/dev/zero");
+       fs::remove(s.home / "spool/outbox.db");
+       s.link("spool/outbox.db", "/dev/zero");
        return s.vlp_station("list");
      },
-     0, "spool/a.json: is a symbolic link", expect_no_forged_line},
+     0, "spool/outbox.db: is no regular file", expect_no_forged_line},
+    {"JournalOfTheOutboxIsALink",
+     [](const HostileStation& s) {
+       s.empty_run();
+       s.link("spool/outbox.db-journal", s.mine);
+       return s.empty_run();
+     },
+     2, "spool/outbox.db: the records: "},
     {"SpooledRunIsNestedWithoutEnd",
      [](const HostileStation& s) {
        s.empty_run();
-       s.write("spool/a.json", std::string(30'000'000, '[') + "\n");
+       s.spool("{", std::string(10'000'000, '['));
        return s.vlp_station("list");
      },
-     0, "it has more than 16 levels", expect_no_forged_line},
+     0, "it has more than 16 levels"},
     {"PlantedReportIsReplaced",
      [](const HostileStation& s) {
        s.empty_run();
@@ -381,7 +401,7 @@ const std::vector<StationTrial> kTextTrials{
      [](const HostileStation& s) {
        s.change("station.yaml", "station: station-1", "station: any");
        s.empty_run();
-       s.spool("\"station\": \"station-1\"", "\"station\": \"any\\nFORGED PASS\"");
+       s.spool("\"station\":\"station-1\"", "\"station\":\"any\\nFORGED PASS\"");
        return s.vlp_station("list --of-station any");
      },
      0, "",
@@ -527,38 +547,39 @@ const std::vector<StationTrial> kResultsTrials{
      2, "steps/lock: is a symbolic link"},
 };
 
-/// Measures time and memory of a command with spool files of the maximum size, or larger.
-TEST_F(HostileStation, ListEndsWithinTimeAndMemoryForHugeSpoolFiles) {
+/// Measures time and memory of a command with documents of the maximum size, or larger.
+TEST_F(HostileStation, ListEndsWithinTimeAndMemoryForHugeDocuments) {
   ASSERT_EQ(empty_run().exit_code, 3);
-  RunRecord large;
-  large.run = "20261121T134501Z-0123456789abcdef";
-  large.camera = "0001";
-  large.verdict = "FAIL";
-  constexpr std::size_t images = 199'000, limit_bytes = 64 << 20;
+  RunRecord small;
+  small.run = kSpooledRun;
+  small.camera = "0001";
+  small.verdict = "FAIL";
+  constexpr std::size_t images = 100'000, limit_bytes = 16 << 20;
+  RunRecord large = small, long_text = small;
   large.images.assign(images, {"boards", "0000.png", std::string(64, 'a'), ""});
-  RunRecord long_text = large;
-  long_text.images.clear();
   long_text.calibration.assign(limit_bytes - 1000, 'x');
-  // Runs of other records, so that they are read but not delivered.
-  const std::vector<std::pair<std::string, std::string>> files{
-      {"a million values", serialize_spooled_run({large, "elsewhere"})},
-      {"a text of 64 MiB", serialize_spooled_run({long_text, "elsewhere"})},
-      {"64 MiB of levels", std::string(limit_bytes - 1, '[') + "\n"},
-      {"more than 64 MiB", std::string(limit_bytes + 1, 'x')}};
+  const std::vector<std::pair<std::string, std::string>> documents{
+      {"half a million values", serialize_run(large)},
+      {"a text of 16 MiB", serialize_run(long_text)},
+      {"16 MiB of levels", std::string(limit_bytes - 1, '[')},
+      {"more than 16 MiB", std::string(limit_bytes + 1, 'x')}};
   const auto script =
       folder.file("measure.py",
                   "import os, subprocess, sys\n"
                   "process = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL)\n"
                   "usage = os.wait4(process.pid, 0)[2]\n"
                   "print(usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)\n");
-  for (const auto& [name, text] : files) {
-    write("spool/a.json", text);
+  for (const auto& [name, text] : documents) {
+    fs::remove(home / "spool/outbox.db");
+    fs::remove(home / "records.db");
+    { const Records made((home / "records.db").string()); }
+    spool(small, text);
     const auto measured =
         run_program("python3 " + script.string() + " vlp-station list --station " +
                     (home / "station.yaml").string());
     double processor_s = 0, megabytes = 0;
     std::istringstream(measured.output) >> processor_s >> megabytes;
-    std::printf("%-18s %5.2f s %5.0f MB\n", name.c_str(), processor_s, megabytes);
+    std::printf("%-21s %5.2f s %5.0f MB\n", name.c_str(), processor_s, megabytes);
     EXPECT_GT(processor_s, 0) << measured.errors;
     EXPECT_LT(processor_s, 10);
     EXPECT_LT(megabytes, 500);

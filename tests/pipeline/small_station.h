@@ -47,6 +47,14 @@ class SmallStation : public testing::Test {
   std::filesystem::path captures(const std::string& camera) const {
     return folder / "station/captures" / camera;
   }
+  /// The names of the files in the station's spool.
+  std::vector<std::string> spooled_files() const {
+    std::vector<std::string> names;
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "station/spool")) {
+      names.push_back(entry.path().filename().string());
+    }
+    return names;
+  }
   /// The images of the unit as another camera would take them: the same pictures, other files.
   void take_again() const;
   /// The images of a step of the unit, by name.

@@ -166,7 +166,7 @@ TEST_F(VlpStationRecords, TrendAndStudiesUseComparableRunsAndTrendExitsWith1ForO
       sql.append("INSERT INTO runs SELECT '").append(run).append("', '").append(kind);
       sql.append("', '").append(of).append("', '").append(camera).append("', '', '', '', '");
       sql.append("2").append(run).append("-01-01T00:00:00Z', '");  // a year each
-      sql.append(verdict).append("', '', '', '', document FROM runs LIMIT 1;\n");
+      sql.append(verdict).append("', '', '', '', document, '' FROM runs LIMIT 1;\n");
       sql.append("INSERT INTO metrics VALUES ('").append(run).append("', 'rms_px', ");
       sql.append(std::to_string(values[i])).append(", NULL);\n");
     }

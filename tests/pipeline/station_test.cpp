@@ -227,7 +227,7 @@ TEST_F(VlpStation, SpoolsRunsAndDeliversThemWhenRecordsReturn) {
   const auto there = records("list");
   EXPECT_EQ(there.exit_code, 0) << there.errors;
   EXPECT_THAT(there.output, AllOf(HasSubstr("3 runs, 0 passed"), Not(HasSubstr("waits"))));
-  EXPECT_TRUE(fs::is_empty(folder / "station/spool"));
+  EXPECT_THAT(spooled_files(), testing::ElementsAre("outbox.db"));
 }
 
 /// A camera that tilts in its housing after the turn.

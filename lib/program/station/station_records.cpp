@@ -9,7 +9,6 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
-#include <memory>
 #include <optional>
 #include <sstream>
 #include <utility>
@@ -20,10 +19,11 @@
 #include "rig/input_error.h"
 #include "station/records/archive_runs.h"
 #include "station/records/certificate.h"
-#include "station/records/known_runs.h"
 #include "station/records/publish_run.h"
 #include "station/records/retention.h"
 #include "station/records/run_record.h"
+#include "station/records/spool.h"
+#include "station/records/void_run.h"
 #include "station/statistics/control_chart.h"
 #include "station/statistics/run_metrics.h"
 #include "station/unit/station_screen.h"
@@ -37,33 +37,46 @@ constexpr const char* kAny = "any";
 /// line nor control the terminal.
 void print_line(const std::string& text) { fmt::print("{}\n", escape_text_for_single_line(text)); }
 
-/// Opens the runs of a station, or of records alone. Reports the state of the spool. If the records
-/// are unavailable, commands that continue without them report it (warn_if_unavailable()).
-std::unique_ptr<KnownRuns> open_runs(const StationRecordsOptions& options) {
+/// Runs of a station, or of records alone.
+struct KnownRuns {
+  std::optional<StationConfig> station;
+  Spool runs;
+
+  /// Returns the station; null for records alone.
+  const StationConfig* station_config() const { return station ? &*station : nullptr; }
+};
+
+/// Opens the runs of a station, of which it first delivers those that wait, or of records alone.
+/// Reports the state of the spool. If the records are unavailable, commands that continue with
+/// waiting runs report it (warn_if_unavailable()).
+KnownRuns open_runs(const StationRecordsOptions& options) {
   if (options.station.empty() == options.records.empty()) {
     throw std::invalid_argument("the records are not specified; give --station or --records");
   }
+  std::optional<StationConfig> station;
+  if (!options.station.empty()) station = read_station_config(options.station);
+  KnownRuns known{station,
+                  station ? Spool(station->spool, station->records) : Spool({}, options.records)};
+  known.runs.deliver_waiting_runs();
   try {
-    if (options.station.empty()) return std::make_unique<KnownRuns>(options.records);
-    auto known = std::make_unique<KnownRuns>(read_station_config(options.station));
-    const std::string state = known->station_spool()->describe_spool_state();
-    if (!state.empty()) {
-      spdlog::log(known->are_records_offline() ? spdlog::level::debug : spdlog::level::warn, "{}",
-                  escape_text_for_terminal(state));
-    }
-    return known;
+    if (known.runs.list_waiting_runs().empty()) known.runs.records_or_throw();
   } catch (const RecordsUnavailable& error) {
     if (error.details != error.what()) spdlog::debug("{}", escape_text_for_terminal(error.details));
     throw;
   }
+  const std::string state = known.runs.describe_spool_state();
+  if (!state.empty()) {
+    const bool is_online = known.runs.last_offline_reason().empty();
+    spdlog::log(is_online ? spdlog::level::warn : spdlog::level::debug, "{}",
+                escape_text_for_terminal(state));
+  }
+  return known;
 }
 
-/// Reports that a command used the runs in the spool because the records are unavailable.
+/// Reports that a command used the waiting runs because the records are unavailable.
 void warn_if_unavailable(KnownRuns& known) {
-  if (known.station_spool() != nullptr && known.are_records_offline()) {
-    spdlog::warn("{}",
-                 escape_text_for_terminal(known.station_spool()->make_spool_notice_for_operator()));
-  }
+  if (known.runs.last_offline_reason().empty()) return;
+  spdlog::warn("{}", escape_text_for_terminal(known.runs.make_spool_notice_for_operator()));
 }
 
 /// Returns the filter with "any" replaced by no condition.
@@ -85,8 +98,13 @@ RunFilter make_filter_of_options(const StationRecordsOptions& options, const Kno
 
 /// Returns the named run, or the last that the filter accepts.
 RunRecord load_selected_run(KnownRuns& known, const StationRecordsOptions& options) {
-  RunRecord run = options.run.empty() ? known.find_last_run(make_filter_of_options(options, known))
-                                      : known.find_run_by_id(options.run);
+  std::string name = options.run;
+  if (name.empty()) {
+    const auto runs = known.runs.list_run_summaries(make_filter_of_options(options, known));
+    if (runs.empty()) throw std::invalid_argument("there is no such run");
+    name = runs.back().run;
+  }
+  RunRecord run = known.runs.require_run(name);
   warn_if_unavailable(known);
   return run;
 }
@@ -161,17 +179,17 @@ std::string format_estimate_test(const EstimateTest& estimate) {
 /// Prints bias and linearity of a station against reference units.
 void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   const auto references = parse_references(options.references);
-  const auto known = open_runs(options);
-  check_output_option(options, *known);
-  const auto points = load_metric_values(known->records_or_throw(), options.metric,
-                                         make_filter_of_comparable_runs(options, *known));
+  KnownRuns known = open_runs(options);
+  check_output_option(options, known);
+  const auto points = load_metric_values(known.runs.records_or_throw(), options.metric,
+                                         make_filter_of_comparable_runs(options, known));
   check_values_are_of_one_station(points, options);
   const auto values = select_values_of_reference_units(points, references);
   std::vector<std::string> units;
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   const BiasStudy study = run_study([&] {
-    check_runs_share_no_images(known->records_or_throw(), points,
+    check_runs_share_no_images(known.runs.records_or_throw(), points,
                                select_values_of_study_units(points, units));
     return analyze_bias_and_linearity(values);
   });
@@ -217,9 +235,9 @@ bool includes_all_runs_of_camera(const RunFilter& filter) {
 }  // namespace
 
 void print_station_run_list(const StationRecordsOptions& options) {
-  const auto known = open_runs(options);
-  RunFilter filter = make_filter_of_options(options, *known);
-  const auto runs = known->list_run_summaries(filter);
+  KnownRuns known = open_runs(options);
+  RunFilter filter = make_filter_of_options(options, known);
+  const auto runs = known.runs.list_run_summaries(filter);
   constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}";
   print_line(
       fmt::format(line, "run", "ended (UTC)", "verdict", "kind", "station", "camera", "cause"));
@@ -245,7 +263,7 @@ void print_station_run_list(const StationRecordsOptions& options) {
                counts.cameras, counts.cameras_reworked, percent * *yield);
   }
   filter.has_open_hook = true;
-  const auto open = known->list_run_summaries(filter);
+  const auto open = known.runs.list_run_summaries(filter);
   const auto without = std::ranges::count_if(runs, [&](const RunSummary& run) {
     return std::ranges::find(open, run.run, &RunSummary::run) != open.end();
   });
@@ -254,12 +272,12 @@ void print_station_run_list(const StationRecordsOptions& options) {
         "{} of them with a hook that failed or did not finish: 'vlp-station hook' runs it again\n",
         without);
   }
-  known->records_or_throw();  // an incomplete list is an error
+  known.runs.records_or_throw();  // an incomplete list is an error
 }
 
 void print_station_run_details(const StationRecordsOptions& options) {
-  const auto known = open_runs(options);
-  const RunRecord record = load_selected_run(*known, options);
+  KnownRuns known = open_runs(options);
+  const RunRecord record = load_selected_run(known, options);
   for (const ScreenLine& line : make_verdict_screen(record)) print_line(line.text);
   fmt::print("\nmetrics without a gate\n");
   for (const CheckedMetric& metric : record.metrics) {
@@ -280,8 +298,8 @@ void print_station_run_details(const StationRecordsOptions& options) {
 
 void restore_run_files(const StationRecordsOptions& options) {
   const std::filesystem::path results = find_results_folder(options);
-  const auto known = open_runs(options);
-  const RunRecord record = load_selected_run(*known, options);
+  KnownRuns known = open_runs(options);
+  const RunRecord record = load_selected_run(known, options);
   const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
   if (!no_verdict.empty()) throw InputError(record.run, no_verdict);
   print_line(publish_run_files(record, {}, results, ExistingReport::replace).string());
@@ -289,26 +307,26 @@ void restore_run_files(const StationRecordsOptions& options) {
 
 void write_calibration_certificate(const StationRecordsOptions& options) {
   const std::filesystem::path results = find_results_folder(options);
-  const auto known = open_runs(options);
-  const RunRecord record = load_selected_run(*known, options);
+  KnownRuns known = open_runs(options);
+  const RunRecord record = load_selected_run(known, options);
   print_line(write_calibration_certificate(record, results).string());
 }
 
 void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
-  const auto known = open_runs(options);
-  const StationConfig& config = *known->station_config();
+  KnownRuns known = open_runs(options);
+  const StationConfig& config = *known.station;
   if (!config.retention.images_days && !config.retention.results_days) {
     throw InputError(options.station, "nothing expires; add the key 'retention'");
   }
-  check_clock_against_recorded_runs(config, known->records_or_throw());
-  const RetentionResult found = find_expired_run_folders(config, known->records_or_throw());
+  check_clock_against_recorded_runs(config, known.runs.records_or_throw());
+  const RetentionResult found = find_expired_run_folders(config, known.runs.records_or_throw());
   constexpr double megabyte = 1e6;
   double all_mb = 0;
   std::size_t done = 0;
   for (const ExpiredFolder& expired : found.expired) {
     const double mb = double(expired.bytes) / megabyte;
     try {
-      if (options.remove) delete_expired_run_folder(expired, config, *known->station_spool());
+      if (options.remove) delete_expired_run_folder(expired, config, known.runs);
     } catch (const InputError& error) {
       spdlog::warn("{}", escape_text_for_terminal(error.what()));
       continue;
@@ -330,7 +348,7 @@ void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
   }
   fmt::print("{} folders, {:.1f} MB{}\n", done, all_mb,
              options.remove ? " deleted" : ": --delete deletes them");
-  known->station_spool()->deliver_waiting_runs();
+  known.runs.deliver_waiting_runs();
   if (done == found.expired.size()) return;
   // [FILE-1] `could not be deleted`
   throw std::runtime_error(fmt::format("{} of {} folders could not be deleted",
@@ -338,20 +356,20 @@ void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
 }
 
 void void_recorded_run(const StationRecordsOptions& options) {
-  const auto known = open_runs(options);
-  const auto [record, problem, files_problem] =
-      void_recorded_run(*known, options.run, options.operator_name, options.reason);
+  KnownRuns known = open_runs(options);
+  const auto [record, problem, files_problem] = void_recorded_run(
+      known.runs, known.station_config(), options.run, options.operator_name, options.reason);
   if (!problem.empty()) spdlog::error("{}", escape_text_for_terminal(problem));
   if (!files_problem.empty()) spdlog::warn("{}", escape_text_for_terminal(files_problem));
-  warn_if_unavailable(*known);
+  warn_if_unavailable(known);
   print_line(fmt::format("{} {} {}: voided", record.run, record.camera, record.verdict));
   for (const ScreenLine& line : make_pending_hook_lines(record)) print_line(line.text);
 }
 
 void verify_records_by_audit_trail(const StationRecordsOptions& options) {
-  const auto known = open_runs(options);
+  KnownRuns known = open_runs(options);
   const TrailCheck found =
-      known->records_or_throw().check_records_by_audit_trail(options.expected_digest);
+      known.runs.records_or_throw().check_records_by_audit_trail(options.expected_digest);
   for (const std::string& problem : found.problems) print_line(problem);
   fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
   if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
@@ -364,9 +382,13 @@ void verify_records_by_audit_trail(const StationRecordsOptions& options) {
 }
 
 void export_selected_runs(const StationRecordsOptions& options) {
-  const auto known = open_runs(options);
-  check_output_option(options, *known);
-  const auto runs = known->load_matching_runs(make_filter_of_options(options, *known));
+  KnownRuns known = open_runs(options);
+  check_output_option(options, known);
+  Records& records = known.runs.records_or_throw();
+  std::vector<RunRecord> runs;
+  for (const RunSummary& run : records.list_run_summaries(make_filter_of_options(options, known))) {
+    if (auto record = records.find_run_by_id(run.run)) runs.push_back(std::move(*record));
+  }
   export_runs_to_file(options.output, runs);
   fmt::print("{} runs\n", runs.size());
 }
@@ -421,10 +443,10 @@ void import_archive_sessions_as_runs(const StationRecordsOptions& options) {
 
 void print_metric_trend(const StationRecordsOptions& options) {
   const MetricKind kind = find_run_metric_kind(options.metric);
-  const auto known = open_runs(options);
-  check_output_option(options, *known);
-  Records& records = known->records_or_throw();
-  RunFilter filter = make_filter_of_comparable_runs(options, *known);
+  KnownRuns known = open_runs(options);
+  check_output_option(options, known);
+  Records& records = known.runs.records_or_throw();
+  RunFilter filter = make_filter_of_comparable_runs(options, known);
   if (options.filter.verdict.empty()) filter.verdict = verdict_name(Verdict::pass);
   const auto points = records.load_metric_trend(options.metric, filter);
   check_values_are_of_one_station(points, options);
@@ -436,7 +458,7 @@ void print_metric_trend(const StationRecordsOptions& options) {
   const std::vector<double> values = extract_trend_values(points);
   const auto alarms = find_control_chart_alarms(values, options.rules);
   const ControlChart chart = compute_control_chart(values);
-  const auto gate = find_gate_limit(options.metric, known->station_config(), records, points);
+  const auto gate = find_gate_limit(options.metric, known.station_config(), records, points);
   if (!options.output.empty())
     write_trend_plot(options.output, options.metric, points, alarms, gate);
   print_line(fmt::format("{} of {} runs, {} to {}", options.metric, points.size(),
@@ -457,16 +479,16 @@ void print_metric_trend(const StationRecordsOptions& options) {
 void print_process_capability(const StationRecordsOptions& options) {
   std::vector<MetricKind> kinds = list_run_metric_kinds();
   if (!options.metric.empty()) kinds = {find_run_metric_kind(options.metric)};
-  const auto known = open_runs(options);
-  Records& records = known->records_or_throw();
-  const RunFilter filter = make_filter_of_comparable_runs(options, *known);
+  KnownRuns known = open_runs(options);
+  Records& records = known.runs.records_or_throw();
+  const RunFilter filter = make_filter_of_comparable_runs(options, known);
   constexpr const char* head = "{:<27}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
   std::vector<std::string> rows;
   rows.reserve(kinds.size());
   for (const MetricKind& kind : kinds) {
     const auto points = load_metric_values(records, kind.name, filter);
     check_values_are_of_one_station(points, options);
-    const auto gate = find_gate_limit(kind.name, known->station_config(), records, points);
+    const auto gate = find_gate_limit(kind.name, known.station_config(), records, points);
     const auto found =
         compute_process_capability(extract_trend_values(points), make_tolerance_limits(kind, gate));
     if (!found) continue;
@@ -491,8 +513,8 @@ void print_process_capability(const StationRecordsOptions& options) {
 void print_gauge_study(const StationRecordsOptions& options) {
   const MetricKind kind = find_run_metric_kind(options.metric);
   if (!options.references.empty()) return print_bias(kind, options);
-  const auto known = open_runs(options);
-  Records& records = known->records_or_throw();
+  KnownRuns known = open_runs(options);
+  Records& records = known.runs.records_or_throw();
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
   const auto points = load_metric_values(records, options.metric, remove_conditions_any(filter));
@@ -501,7 +523,7 @@ void print_gauge_study(const StationRecordsOptions& options) {
     check_runs_share_no_images(records, points, values);
     return analyze_repeatability_and_reproducibility(values);
   });
-  const auto gate = find_gate_limit(options.metric, known->station_config(), records, points);
+  const auto gate = find_gate_limit(options.metric, known.station_config(), records, points);
   print_line(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}", options.metric,
                          study.units, study.stations, study.repeats, study.mean, kind.unit));
   fmt::print("\n");

@@ -48,6 +48,8 @@ void configure_connection(soci::session& sql, int timeout_s) {
   // the journal and remove a run. A second connection sees complete runs.
   sql << "PRAGMA synchronous = EXTRA";
   sql << "PRAGMA foreign_keys = ON";
+  // A file that others made can have triggers and views.
+  sql << "PRAGMA trusted_schema = OFF";
 }
 
 void open_database_session(soci::session& sql, const std::string& where) {
@@ -229,7 +231,7 @@ constexpr int kManyRowsTimeoutFactor = 10;
 
 /// Stores the rows of a run. Returns false if the run exists.
 bool insert_run(soci::session& sql, const std::string& run, const RunRows& rows,
-                ConnectionWatchdog& watch) {
+                const std::string& destination, ConnectionWatchdog& watch) {
   soci::statement insert(sql);
   std::string places;
   for (const std::string& column : rows.columns) {
@@ -237,8 +239,10 @@ bool insert_run(soci::session& sql, const std::string& run, const RunRows& rows,
     insert.exchange(soci::use(column));
   }
   insert.exchange(soci::use(rows.document));
+  insert.exchange(soci::use(destination));
   insert.alloc();
-  insert.prepare("INSERT INTO runs VALUES (" + places + ":document) ON CONFLICT (run) DO NOTHING");
+  insert.prepare("INSERT INTO runs VALUES (" + places +
+                 ":document, :destination) ON CONFLICT (run) DO NOTHING");
   insert.define_and_bind();
   insert.execute(true);
   watch.on_progress();
@@ -308,6 +312,7 @@ std::string bind_filter(soci::statement& statement, const RunFilter& filter) {
   add(filter.shift, "runs.shift = :shift");
   add(filter.since, "runs.ended_utc >= :since");
   add(filter.until, "runs.ended_utc < :until");
+  add(filter.destination, "runs.destination = :destination");
   add(filter.image_sha256,
       "runs.run IN (SELECT images.run FROM images WHERE images.sha256 = :sha256)");
   return filter.has_open_hook ? text + " AND " + kHookOpen : text;
@@ -363,14 +368,14 @@ Records::Records(const std::string& where) : database_(std::make_unique<Database
 
 Records::~Records() = default;
 
-void Records::store_run(const RunRecord& record) {
+void Records::store_run(const RunRecord& record, const std::string& destination) {
   database_->run([&](ConnectionWatchdog& watch) {
     soci::session& sql = database_->sql;
     const RunRecord escaped = escape_texts_of_run(record);
     const RunRows rows = make_run_rows(serialize_run(escaped));
     soci::transaction transaction(sql);
     // Writes first, so that the transaction waits for others before it reads.
-    const bool is_new = insert_run(sql, escaped.run, rows, watch);
+    const bool is_new = insert_run(sql, escaped.run, rows, destination, watch);
     if (!is_new && !has_stored_document(sql, escaped.run, rows.document)) {
       // [STATION-15] `has another run` | records or results edited, or two of one name; nothing is
       //   overwritten | compare both
@@ -379,6 +384,19 @@ void Records::store_run(const RunRecord& record) {
     const auto new_events = insert_events(sql, escaped, watch);
     // Last, because all stations that share the records wait for it.
     append_run_events_to_audit_trail(sql, escaped.run, is_new ? rows.document : "", new_events);
+    transaction.commit();
+  });
+}
+
+void Records::remove_delivered_run(const RunRecord& record) {
+  database_->run([&](ConnectionWatchdog&) {
+    soci::session& sql = database_->sql;
+    soci::transaction transaction(sql);
+    sql << "DELETE FROM trail WHERE run = :run", soci::use(record.run);  // locks before it reads
+    if (load_run_events(sql, record.run).size() > record.events.size()) return;
+    for (const char* table : {"metrics", "images", "events", "runs"}) {
+      sql << fmt::format("DELETE FROM {} WHERE run = :run", table), soci::use(record.run);
+    }
     transaction.commit();
   });
 }
@@ -395,13 +413,14 @@ std::vector<RunSummary> Records::list_run_summaries(const RunFilter& filter) {
   using Line = RunSummary;
   constexpr const char* select =
       "SELECT run, kind, station, camera, ended_utc, verdict, causes, COALESCE((SELECT "
-      "MIN(events.text) FROM events WHERE events.run = runs.run AND events.what = 'voided'), '') "
-      "FROM runs ";
+      "MIN(events.text) FROM events WHERE events.run = runs.run AND events.what = 'voided'), ''), "
+      "destination FROM runs ";
   return database_->run(
       [&](ConnectionWatchdog&) {
-        return query_rows<Line>(database_->sql, select, filter, " ORDER BY ended_utc, run", "",
-                                {&Line::run, &Line::kind, &Line::station, &Line::camera,
-                                 &Line::ended_utc, &Line::verdict, &Line::causes, &Line::voided});
+        return query_rows<Line>(
+            database_->sql, select, filter, " ORDER BY ended_utc, run", "",
+            {&Line::run, &Line::kind, &Line::station, &Line::camera, &Line::ended_utc,
+             &Line::verdict, &Line::causes, &Line::voided, &Line::destination});
       },
       filter.image_sha256.empty() ? kManyRowsTimeoutFactor : 1);
 }

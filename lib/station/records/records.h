@@ -25,6 +25,8 @@ struct RunFilter {
   std::string since = {}, until = {};
   /// SHA-256 of an image that a selected run uses.
   std::string image_sha256 = {};
+  /// Identity of the records to which a waiting run belongs (Records::store_run()).
+  std::string destination = {};
   /// True for runs with an open hook only (is_hook_pending()).
   bool has_open_hook = false;
   /// Maximum number of runs, the latest ones; 0 for all.
@@ -36,6 +38,8 @@ struct RunSummary {
   std::string run, kind, station, camera, ended_utc, verdict, causes;
   /// Reason for voiding it; empty if it is not voided.
   std::string voided = {};
+  /// RunFilter::destination; empty in the records themselves.
+  std::string destination = {};
 };
 
 /// Value of a metric in one run, in the unit of the metric.
@@ -95,7 +99,10 @@ class Records {
 
   /// Stores a run atomically. A stored run is not changed but gets the events that it lacks. A
   /// different run of the same id is an error.
-  void store_run(const RunRecord& record);
+  /// @param destination  identity of other records, to which the run is to be delivered; else empty
+  void store_run(const RunRecord& record, const std::string& destination = "");
+  /// Removes a delivered run with its trail, unless it has got another event meanwhile.
+  void remove_delivered_run(const RunRecord& record);
   /// Returns a complete run; std::nullopt if no run has this id.
   std::optional<RunRecord> find_run_by_id(const std::string& run);
   /// Checks that runs can be stored now. Throws InputError otherwise.

@@ -277,7 +277,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kDigits = 9;
 constexpr const char* kRunFormat = "vlp-run/3";
-constexpr std::size_t kMaxDocumentBytes = 64 << 20;
+constexpr std::size_t kMaxDocumentBytes = 16 << 20;
 
 std::string join_lines(std::string text) {
   while (text.ends_with('\n')) text.pop_back();
@@ -406,46 +406,13 @@ std::string serialize_run(const RunRecord& run) {
 
 RunRecord parse_run_document(const std::string& document) {
   try {
-    if (document.size() > kMaxDocumentBytes) throw std::runtime_error("it has more than 64 MiB");
+    if (document.size() > kMaxDocumentBytes) throw std::runtime_error("it has more than 16 MiB");
     check_json_size_and_depth(document);
     return parse_run(Json::parse(document));
   } catch (const std::exception& error) {
     // [STATION-12] `no run of a station` | a run of the spool or the records was edited by hand |
     //   compare with a backup
     throw std::runtime_error(std::string("is no run of a station: ") + error.what());
-  }
-}
-
-std::string serialize_spooled_run(const SpooledRun& spooled) {
-  Json json;
-  json["records"] = escape_text_for_single_line(spooled.records);
-  json.update(make_run_json_with_events(escape_texts_of_run(spooled.run)));
-  return serialize(json, 1);
-}
-
-SpooledRun read_spooled_run(const std::filesystem::path& file) {
-  const auto text = SharedFolder(file.parent_path())
-                        .read_file_if_exists(file.filename().string(), kMaxDocumentBytes);
-  // [FILE-1]
-  if (!text) throw InputError(file, "cannot be opened: it was removed");
-  try {
-    SpooledRun spooled{parse_run_document(*text), ""};
-    const Json json = Json::parse(*text);
-    json.at("records").get_to(spooled.records);
-    // [STATION-12] `is no id`. Both name folders and files.
-    for (const std::string& id : {spooled.run.run, spooled.run.camera}) {
-      if (!Id::is_valid_name_of_camera_or_run(id))
-        throw std::runtime_error("is no run of a station: its run or camera is no id");
-    }
-    for (const Json& event : json.at("events")) {
-      spooled.run.events.push_back(
-          {event.at("event"), event.at("what"), event.at("text"), event.at("who")});
-      if (!Id::is_valid_name_of_camera_or_run(spooled.run.events.back().event))
-        throw std::runtime_error("is no run of a station: an event is no id");
-    }
-    return spooled;
-  } catch (const std::exception& error) {
-    throw InputError(file, error.what());
   }
 }
 

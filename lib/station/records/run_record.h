@@ -170,21 +170,8 @@ std::string list_library_versions();
 std::string serialize_run(const RunRecord& run);
 /// Reads a document of serialize_run().
 /// @throws std::runtime_error if the text is no such document, has no run or verdict, or exceeds
-///   check_json_size_and_depth() or 64 MiB
+///   check_json_size_and_depth() or 16 MiB
 RunRecord parse_run_document(const std::string& document);
-
-/// Run and derive_database_identity() of the records that it belongs to.
-struct SpooledRun {
-  RunRecord run;
-  std::string records;
-};
-
-/// Serializes a run as JSON text: "records" (identity of its database), the members of
-/// serialize_run(), and "events".
-std::string serialize_spooled_run(const SpooledRun& spooled);
-/// Reads a run in the format of serialize_spooled_run(). Throws InputError with the file. Also
-/// throws it for a run without a verdict, or if the name of run, camera or event is not a valid Id.
-SpooledRun read_spooled_run(const std::filesystem::path& file);
 
 /// Returns the JSON for the hook: "event" ("verdict", or "voided" for a voided run), then the
 /// members of serialize_run(), and "events".

@@ -119,4 +119,41 @@ std::vector<ReferenceValue> select_values_of_reference_units(
   return values;
 }
 
+std::optional<double> RunCounts::compute_yield() const {
+  if (units_judged == 0) return std::nullopt;
+  return static_cast<double>(units_passed) / static_cast<double>(units_judged);
+}
+
+std::optional<double> RunCounts::compute_first_pass_yield() const {
+  if (cameras == 0) return std::nullopt;
+  return static_cast<double>(cameras_passed_first) / static_cast<double>(cameras);
+}
+
+RunCounts count_runs_by_verdict(std::span<const RunSummary> runs) {
+  RunCounts counts;
+  std::map<std::string, int> judged;
+  for (const RunSummary& run : runs) {
+    if (!run.voided.empty()) {
+      ++counts.voided;
+      continue;
+    }
+    const bool passed = run.verdict == verdict_name(Verdict::pass);
+    const bool failed = run.verdict == verdict_name(Verdict::fail);
+    if (passed) ++counts.passed;
+    if (failed) ++counts.failed;
+    if (run.verdict == verdict_name(Verdict::invalid)) ++counts.invalid;
+    if (run.kind != "unit") continue;
+    if (passed) ++counts.units_passed;
+    if (!passed && !failed) continue;
+    ++counts.units_judged;
+    if (const auto runs_of_camera = ++judged[run.camera]; runs_of_camera == 1) {
+      ++counts.cameras;
+      if (passed) ++counts.cameras_passed_first;
+    } else if (runs_of_camera == 2) {
+      ++counts.cameras_reworked;
+    }
+  }
+  return counts;
+}
+
 }  // namespace vlp

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,5 +54,23 @@ void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>&
 /// select_values_of_study_units().
 std::vector<ReferenceValue> select_values_of_reference_units(
     const std::vector<TrendPoint>& points, const std::map<std::string, double>& references);
+
+/// Numbers of runs by result; voided runs are counted separately.
+struct RunCounts {
+  std::size_t passed = 0, failed = 0, invalid = 0, voided = 0;
+  /// Number of judged runs of units that passed, and number of all judged runs of units.
+  std::size_t units_passed = 0, units_judged = 0;
+  /// Cameras with judged runs as units: all, those whose first run passed, and those with two runs
+  /// or more.
+  std::size_t cameras = 0, cameras_passed_first = 0, cameras_reworked = 0;
+
+  /// Returns the fraction of runs of units that passed, std::nullopt if no unit was judged.
+  std::optional<double> compute_yield() const;
+  /// Returns the fraction of cameras whose first run passed, std::nullopt if no unit was judged.
+  std::optional<double> compute_first_pass_yield() const;
+};
+
+/// Counts runs. `runs` are in chronological order.
+RunCounts count_runs_by_verdict(std::span<const RunSummary> runs);
 
 }  // namespace vlp

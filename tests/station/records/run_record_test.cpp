@@ -6,9 +6,14 @@
 
 #include <algorithm>
 #include <chrono>
+#include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
+
+#include "numbered_runs.h"
+#include "support/rejection_message.h"
 
 namespace vlp {
 namespace {
@@ -79,6 +84,50 @@ TEST(DescribeClockProblem, ReportsRunThatEndedBeforeItsStart) {
   EXPECT_EQ(describe_clock_problem(run),
             "the clock went back: the run ended 2026-11-21T13:45:00Z, before it began "
             "2026-11-21T13:45:01Z: set the clock, and measure again");
+}
+
+TEST(ParseRunDocument, ReturnsAllFieldsOfSerializedRun) {
+  RunRecord run = numbered_run(1);
+  for (const RunField& field : list_run_text_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
+  for (std::string* lines : {&run.causes, &run.calibration}) lines->append("\n\tof lines\n");
+  run.images[0].name = "\xff\x1b[31m.png";
+  run.images[1].rejection = "too dark";
+  const std::string document = serialize_run(run);
+  const RunRecord read = parse_run_document(document);
+  EXPECT_EQ(serialize_run(read), document);
+  for (const RunField& field : list_run_text_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
+  ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
+  for (std::size_t i = 0; i < run.metrics.size(); ++i) {
+    EXPECT_EQ(read.metrics[i].name, run.metrics[i].name);
+    EXPECT_EQ(read.metrics[i].unit, run.metrics[i].unit);
+    EXPECT_EQ(read.metrics[i].value, run.metrics[i].value);  // to the last bit
+    EXPECT_EQ(read.metrics[i].limit, run.metrics[i].limit);
+    EXPECT_EQ(read.metrics[i].direction, run.metrics[i].direction);
+    ASSERT_EQ(read.metrics[i].guard_band.has_value(), i == 0);
+    if (!read.metrics[i].guard_band) continue;
+    EXPECT_EQ(read.metrics[i].guard_band->standard_uncertainty, 0.01);
+    EXPECT_EQ(read.metrics[i].guard_band->k, 1.645);
+  }
+  ASSERT_THAT(read.images, SizeIs(run.images.size()));
+  EXPECT_EQ(read.images[0].name, "\\xff\\x1b[31m.png");
+  EXPECT_EQ(read.images[1].rejection, "too dark");
+  EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
+}
+
+TEST(ParseRunDocument, ThrowsWithCauseForInvalidDocument) {
+  const std::string text = serialize_run(numbered_run(1));
+  for (const auto& [bad, cause] : std::vector<std::pair<std::string, std::string>>{
+           {"{}", "format"},
+           {"[]", ""},
+           {text.substr(0, text.size() / 2), ""},
+           {std::string(text).replace(text.find("vlp-run/3"), 9, "vlp-run/2"), "another format"},
+           {std::string(text).replace(text.find("\"metrics\""), 9, "\"metricz\""), "metrics"},
+           {std::string(text).replace(text.find("FAIL"), 4, ""), "no run, or no verdict"},
+           {std::string(1'000'000, '['), "it has more than 16 levels"}}) {
+    EXPECT_THAT(
+        rejection_message<std::runtime_error>([&, &text = bad] { parse_run_document(text); }),
+        testing::AllOf(testing::StartsWith("is no run of a station: "), testing::HasSubstr(cause)));
+  }
 }
 
 }  // namespace

@@ -19,6 +19,7 @@
 #include "support/child_process.h"
 #include "support/postgres_server.h"
 #include "support/random.h"
+#include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
 namespace vlp {
@@ -95,6 +96,39 @@ TEST(Spool, LosesNoRunWhenDiskOfRecordsIsFull) {
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
   Spool(folder / "spool", where).deliver_waiting_runs();
   EXPECT_THAT(whole_runs(where), SizeIs(40));
+}
+
+TEST(Spool, LosesNoRunWhenDiskOfSpoolIsFull) {
+  const TemporaryFolder folder;
+  const auto small = folder / "small";
+  fs::create_directory(small);
+  if (::mount("none", small.c_str(), "tmpfs", 0, "size=512k") != 0) {
+    GTEST_SKIP() << "no small file system can be mounted here";
+  }
+  const SmallDisk disk{small};
+  const std::string where = (folder / "records.db").string();
+  Spool offline(small, where);
+  std::size_t num_waiting = 0;
+  std::string refused;
+  for (; refused.empty() && num_waiting < 1000; ++num_waiting) {
+    refused = rejection_message([&] { offline.store_run(numbered_run(int(num_waiting))); });
+  }
+  --num_waiting;  // without the refused run
+  EXPECT_THAT(refused, AllOf(HasSubstr("can be stored neither in the spool"), HasSubstr("full")));
+  ASSERT_GT(num_waiting, 0u);
+  EXPECT_THAT(offline.list_waiting_runs(), SizeIs(num_waiting));
+  EXPECT_NE(rejection_message([&] { offline.check_runs_can_be_stored(); }), "");
+  // The records take the next run. Those that wait are delivered, too, but not removed.
+  { const Records made(where); }
+  Spool full(small, where);
+  full.store_run(numbered_run(1000));
+  EXPECT_EQ(whole_runs(where), std::set<std::string>{numbered_run(1000).run});
+  full.deliver_waiting_runs();
+  EXPECT_THAT(whole_runs(where), SizeIs(num_waiting + 1));
+  ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
+  full.check_runs_can_be_stored();
+  EXPECT_EQ(full.describe_spool_state(), "");
+  EXPECT_THAT(whole_runs(where), SizeIs(num_waiting + 1));
 }
 
 /// Kills a program that stores runs, VLP_STATION_KILLS times at random moments. The longest wait

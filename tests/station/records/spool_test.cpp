@@ -12,6 +12,7 @@
 
 #include <chrono>
 #include <cstdlib>
+#include <fstream>
 #include <functional>
 #include <set>
 #include <sstream>
@@ -37,86 +38,6 @@ using testing::IsEmpty;
 using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
-
-TEST(ReadSpooledRun, ReturnsAllFieldsOfSerializedRun) {
-  const TemporaryFolder folder;
-  RunRecord run = numbered_run(1);
-  for (const RunField& field : list_run_text_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
-  for (std::string* lines : {&run.causes, &run.calibration}) lines->append("\n\tof lines\n");
-  run.images[1].rejection = "too dark";
-  const auto [read, records] =
-      read_spooled_run(folder.file("run.json", serialize_spooled_run({run, "records.db"})));
-  EXPECT_EQ(records, "records.db");
-  for (const RunField& field : list_run_text_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
-  ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
-  for (std::size_t i = 0; i < run.metrics.size(); ++i) {
-    EXPECT_EQ(read.metrics[i].name, run.metrics[i].name);
-    EXPECT_EQ(read.metrics[i].unit, run.metrics[i].unit);
-    EXPECT_EQ(read.metrics[i].value, run.metrics[i].value);  // to the last bit
-    EXPECT_EQ(read.metrics[i].limit, run.metrics[i].limit);
-    EXPECT_EQ(read.metrics[i].direction, run.metrics[i].direction);
-    ASSERT_EQ(read.metrics[i].guard_band.has_value(), i == 0);
-    if (!read.metrics[i].guard_band) continue;
-    EXPECT_EQ(read.metrics[i].guard_band->standard_uncertainty, 0.01);
-    EXPECT_EQ(read.metrics[i].guard_band->k, 1.645);
-  }
-  ASSERT_THAT(read.images, SizeIs(run.images.size()));
-  EXPECT_EQ(read.images[1].rejection, "too dark");
-  EXPECT_EQ(read.images[29].sha256, run.images[29].sha256);
-}
-
-TEST(ReadSpooledRun, EscapesImageNamesThatAreNotUtf8) {
-  const TemporaryFolder folder;
-  RunRecord run = numbered_run(1);
-  run.images[0].name = "\xff\x1b[31m.png";
-  EXPECT_EQ(read_spooled_run(folder.file("run.json", serialize_spooled_run({run, "records.db"})))
-                .run.images[0]
-                .name,
-            "\\xff\\x1b[31m.png");
-}
-
-TEST(ReadSpooledRun, ThrowsWithFileNameForInvalidRun) {
-  const TemporaryFolder folder;
-  const std::string text = serialize_spooled_run({numbered_run(1), "records.db"});
-  for (const std::string& bad :
-       {std::string("{}\n"), std::string("[]\n"), text.substr(0, text.size() / 2) + "\n",
-        std::string(text).replace(text.find("vlp-run/3"), 9, "vlp-run/2"),
-        std::string(text).replace(text.find("\"metrics\""), 9, "\"metricz\"")}) {
-    EXPECT_THAT(rejection_message([&] { read_spooled_run(folder.file("bad.json", bad)); }),
-                HasSubstr("bad.json: is no run of a station"));
-  }
-}
-
-TEST(ReadSpooledRun, RejectsIdsThatLeadToOtherFolders) {
-  const TemporaryFolder folder;
-  RunRecord run = numbered_run(1);
-  run.camera = "../..";
-  const auto refusal = [&] {
-    return rejection_message([&] {
-      read_spooled_run(folder.file("bad.json", serialize_spooled_run({run, "records.db"})));
-    });
-  };
-  EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
-  run = numbered_run(1);
-  run.run = "../x";
-  EXPECT_THAT(refusal(), HasSubstr("its run or camera is no id"));
-  run = numbered_run(1);
-  run.events.push_back({"../x", kHookDone, "", ""});
-  EXPECT_THAT(refusal(), HasSubstr("an event is no id"));
-}
-
-TEST(ReadSpooledRun, RejectsSpecialFilesAndDeepNesting) {
-  const TemporaryFolder folder;
-  ASSERT_EQ(::mkfifo((folder / "pipe.json").c_str(), 0600), 0);
-  EXPECT_THAT(rejection_message([&] { read_spooled_run(folder / "pipe.json"); }),
-              HasSubstr("pipe.json: is no regular file"));
-  std::filesystem::create_symlink("/dev/zero", folder / "link.json");
-  EXPECT_THAT(rejection_message([&] { read_spooled_run(folder / "link.json"); }),
-              HasSubstr("link.json: is a symbolic link"));
-  EXPECT_THAT(rejection_message(
-                  [&] { read_spooled_run(folder.file("deep.json", std::string(1'000'000, '['))); }),
-              HasSubstr("it has more than 16 levels"));
-}
 
 TEST(Spool, DeliversStoredRunsWhenRecordsBecomeReachable) {
   const TemporaryFolder folder;
@@ -172,7 +93,7 @@ TEST(Spool, FindGoldenRunUsingImageReturnsOnlyJudgedGoldenRuns) {
     EXPECT_EQ(spool.find_golden_run_using_image("digest-2-7"), "") << "not judged, " << state;
     spool.deliver_waiting_runs();
   }
-  EXPECT_TRUE(fs::is_empty(folder / "spool"));
+  EXPECT_THAT(spool.list_waiting_runs(), IsEmpty());
 }
 
 /// Two evaluations of the same images are not two measurements.
@@ -235,15 +156,14 @@ TEST(Spool, KeepsLaterEventsInWaitingRun) {
   EXPECT_THAT(list_open_hooks(spool, "station-1"), IsEmpty());
   spool.deliver_waiting_runs();
   EXPECT_THAT(spool.describe_spool_state(), StartsWith("runs are queued in the spool, 1 waiting"));
-  ASSERT_THAT(spool.list_waiting_runs(), SizeIs(1));
-  EXPECT_THAT(spool.list_waiting_runs()[0].events, SizeIs(3));
+  EXPECT_THAT(spool.list_waiting_runs(), SizeIs(1));
   EXPECT_THAT(spool.find_run_by_id(run.run)->events, SizeIs(3));
 
   fs::create_directory(folder / "away");
   Spool later(folder / "spool", where);
   later.check_runs_can_be_stored();
   EXPECT_EQ(later.describe_spool_state(), "");
-  EXPECT_TRUE(fs::is_empty(folder / "spool"));
+  EXPECT_THAT(later.list_waiting_runs(), IsEmpty());
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   const auto kept = later.find_run_by_id(run.run);
   ASSERT_THAT(kept->events, SizeIs(3));
@@ -251,44 +171,59 @@ TEST(Spool, KeepsLaterEventsInWaitingRun) {
   EXPECT_THAT(list_open_hooks(later, "station-1"), IsEmpty());
 }
 
-TEST(Spool, DeliversValidRunsDespiteInvalidFilesInSpool) {
+TEST(Spool, DeliversValidRunsDespiteInvalidDocumentInOutbox) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
   spool.check_runs_can_be_stored();
-  spool.store_run(numbered_run(1));
-  folder.file("spool/0.json", "{}\n");
-  folder.file("spool/.1.json.tmp-1-0", "{");
+  for (int i = 1; i <= 2; ++i) spool.store_run(numbered_run(i));
+  run_database_client((folder / "spool/outbox.db").string(),
+                      "UPDATE runs SET document = '{}' WHERE camera = 'camera-1';\n");
   spool.deliver_waiting_runs();
-  EXPECT_THAT(whole_runs(where), SizeIs(1));
-  EXPECT_THAT(spool.describe_spool_state(),
-              AllOf(HasSubstr("0.json: is no run"), Not(HasSubstr("waiting"))));
-  fs::remove(where);  // offline
-  Spool other(folder / "spool", where);
-  other.store_run(numbered_run(2));
-  other.deliver_waiting_runs();
-  EXPECT_THAT(other.describe_spool_state(),
-              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
-                    HasSubstr("records.db"), HasSubstr("; "), HasSubstr("0.json: is no run")));
-}
-
-TEST(Spool, ListsRunOnceItsTruncatedFileIsComplete) {
-  const TemporaryFolder folder;
-  const std::string where = (folder / "away/records.db").string();
-  Spool spool(folder / "spool", where);
-  const std::string text =
-      serialize_spooled_run({numbered_run(1), derive_database_identity(where)});
-  fs::create_directory(folder / "spool");
-  folder.file("spool/1.json", text.substr(0, text.size() / 2));
-  EXPECT_THAT(spool.list_waiting_runs(), IsEmpty());
-  EXPECT_THAT(spool.describe_spool_state(), AllOf(HasSubstr("1.json"), Not(HasSubstr("waiting"))));
-  folder.file("spool/1.json", text);
-  EXPECT_THAT(spool.list_waiting_runs(), SizeIs(1));
-  EXPECT_EQ(spool.find_run_of_other_camera_using_image("digest-1-7", "b"),
-            (ImageUser{"camera-1", numbered_run(1).run}));
+  EXPECT_EQ(whole_runs(where), std::set<std::string>{numbered_run(2).run});
   EXPECT_THAT(
       spool.describe_spool_state(),
-      AllOf(StartsWith("runs are queued in the spool, 1 waiting"), Not(HasSubstr("1.json"))));
+      AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+            HasSubstr("outbox.db: run " + numbered_run(1).run + " is no run of a station: ")));
+}
+
+TEST(Spool, RejectsOutboxThatIsNoDatabaseAndStoresRunInRecords) {
+  for (const auto& make : {+[](const fs::path& file) { std::ofstream(file) << "no database\n"; },
+                           +[](const fs::path& file) { fs::create_symlink("/dev/zero", file); },
+                           +[](const fs::path& file) { ::mkfifo(file.c_str(), 0600); }}) {
+    const TemporaryFolder folder;
+    const std::string where = (folder / "records.db").string();
+    { const Records made(where); }
+    fs::create_directory(folder / "spool");
+    make(folder / "spool/outbox.db");
+    Spool spool(folder / "spool", where);
+    const auto names_cause =
+        AllOf(HasSubstr("spool/outbox.db: "),
+              testing::AnyOf(HasSubstr("is no regular file"), HasSubstr("not a database")));
+    EXPECT_THAT(rejection_message([&] { spool.check_runs_can_be_stored(); }), names_cause);
+    spool.store_run(numbered_run(1));
+    EXPECT_THAT(whole_runs(where), SizeIs(1));
+    EXPECT_THAT(spool.describe_spool_state(), names_cause);
+  }
+}
+
+/// Another program can store an event between delivery and removal.
+TEST(Spool, KeepsEventStoredDuringDelivery) {
+  const TemporaryFolder folder;
+  Records outbox((folder / "outbox.db").string());
+  RunRecord run = numbered_run(1);
+  outbox.store_run(run, "elsewhere");
+  const auto delivered = outbox.find_run_by_id(run.run);
+  ASSERT_TRUE(delivered);
+  run.events = {make_run_event_now(kHookDone, "")};
+  outbox.store_run(run, "elsewhere");
+  outbox.remove_delivered_run(*delivered);
+  const auto kept = outbox.find_run_by_id(run.run);
+  ASSERT_TRUE(kept);
+  EXPECT_THAT(kept->events, SizeIs(1));
+  outbox.remove_delivered_run(*kept);
+  EXPECT_FALSE(outbox.find_run_by_id(run.run));
+  EXPECT_EQ(outbox.check_records_by_audit_trail("").entries, 0U);
 }
 
 TEST(Spool, StoresRunInRecordsWhenSpoolFolderCannotBeWritten) {
@@ -426,6 +361,50 @@ TEST(Spool, DeliversAllRunsOfConcurrentPrograms) {
   spool.deliver_waiting_runs();
   EXPECT_EQ(spool.describe_spool_state(), "");
   EXPECT_THAT(whole_runs(where), SizeIs(40));
+}
+
+TEST(Spool, ListsStoredAndWaitingRunsByFilter) {
+  const TemporaryFolder folder;
+  const std::string where = (folder / "records.db").string(), away = (folder / "away.db").string();
+  RunRecord night = numbered_run(1), day = numbered_run(2), waiting = numbered_run(3);
+  night.operator_name = "Ann";
+  night.shift = "night";
+  waiting.operator_name = "Bea";
+  waiting.ended_utc = "2026-11-21T13:51:01Z";
+  for (const RunRecord* run : {&night, &day}) Records(where).store_run(*run);
+  Spool spool(folder / "spool", where);
+  spool.store_run(waiting);
+  const auto expect_three = [&](Spool& runs) {
+    EXPECT_THAT(list_ids(runs, {}), testing::ElementsAre(night.run, day.run, waiting.run));
+    EXPECT_THAT(list_ids(runs, {.last = 1}), testing::ElementsAre(waiting.run));
+    EXPECT_THAT(list_ids(runs, {.operator_name = "Ann"}), testing::ElementsAre(night.run));
+    EXPECT_THAT(list_ids(runs, {.shift = "night"}), testing::ElementsAre(night.run));
+    EXPECT_THAT(list_ids(runs, {.operator_name = "Bea"}), testing::ElementsAre(waiting.run));
+    EXPECT_THAT(list_ids(runs, {.operator_name = "Cat"}), IsEmpty());
+    EXPECT_THAT(list_ids(runs, {.until = "2026-11-21T13:51"}), SizeIs(2));
+    EXPECT_EQ(runs.require_run(night.run).camera, night.camera);
+    EXPECT_EQ(runs.require_run(waiting.run).camera, waiting.camera);
+    EXPECT_THROW(runs.require_run("none"), std::invalid_argument);
+  };
+  expect_three(spool);
+  EXPECT_THAT(spool.list_run_summaries({}).back().causes, StartsWith("(waits here) "));
+  // A waiting run counts as it waits, with its newer events.
+  night.events = {make_run_event_now(kVoided, "wrong serial")};
+  spool.store_run(night);
+  EXPECT_EQ(spool.list_run_summaries({})[0].voided, "wrong serial");
+  spool.deliver_waiting_runs();
+  expect_three(spool);
+  EXPECT_EQ(spool.list_run_summaries({})[0].voided, "wrong serial");
+  EXPECT_THAT(spool.list_run_summaries({}).back().causes, Not(StartsWith("(waits here) ")));
+  // Without records, the waiting runs alone.
+  fs::rename(where, away);
+  Spool offline(folder / "spool", where);
+  offline.store_run(waiting);
+  EXPECT_THAT(list_ids(offline, {}), testing::ElementsAre(waiting.run));
+  EXPECT_EQ(offline.require_run(waiting.run).camera, waiting.camera);
+  EXPECT_THROW(offline.records_or_throw(), RecordsUnavailable) << "these are not all";
+  EXPECT_FALSE(fs::exists(where)) << "a station makes them";
+  EXPECT_THROW(Spool({}, where).records_or_throw(), RecordsUnavailable);
 }
 
 }  // namespace

@@ -112,5 +112,37 @@ TEST_F(RunMetrics, CheckRunsShareNoImagesThrowsForSameImages) {
             "");
 }
 
+TEST(CountRunsByVerdict, ExcludesVoidedRunsFromYield) {
+  const std::vector<RunSummary> runs{{"1", "unit", "", "", "", "PASS", "", ""},
+                                     {"2", "unit", "", "", "", "PASS", "", ""},
+                                     {"3", "unit", "", "", "", "FAIL", "", ""},
+                                     {"4", "unit", "", "", "", "FAIL", "", "wrong serial"},
+                                     {"5", "unit", "", "", "", "INVALID", "", ""},
+                                     {"6", "golden", "", "", "", "PASS", "", ""}};
+  const RunCounts counts = count_runs_by_verdict(runs);
+  EXPECT_EQ(counts.passed, 3U);
+  EXPECT_EQ(counts.failed, 1U);
+  EXPECT_EQ(counts.invalid, 1U);
+  EXPECT_EQ(counts.voided, 1U);
+  EXPECT_EQ(counts.units_judged, 3U);
+  EXPECT_DOUBLE_EQ(counts.compute_yield().value(), 2.0 / 3);
+  EXPECT_FALSE(count_runs_by_verdict({}).compute_yield());
+}
+
+TEST(CountRunsByVerdict, CountsReworkedCamerasAndFirstPassYield) {
+  const std::vector<RunSummary> runs{{"1", "unit", "", "a", "", "PASS", "", ""},
+                                     {"2", "unit", "", "b", "", "FAIL", "", ""},
+                                     {"3", "unit", "", "b", "", "PASS", "", ""},
+                                     {"4", "unit", "", "c", "", "INVALID", "", ""},
+                                     {"5", "unit", "", "c", "", "PASS", "", ""},
+                                     {"6", "unit", "", "d", "", "FAIL", "", "wrong serial"},
+                                     {"7", "golden", "", "g", "", "FAIL", "", ""}};
+  const RunCounts counts = count_runs_by_verdict(runs);
+  EXPECT_EQ(counts.cameras, 3U);
+  EXPECT_EQ(counts.cameras_reworked, 1U);
+  EXPECT_DOUBLE_EQ(counts.compute_first_pass_yield().value(), 2.0 / 3);
+  EXPECT_FALSE(count_runs_by_verdict({}).compute_first_pass_yield());
+}
+
 }  // namespace
 }  // namespace vlp
