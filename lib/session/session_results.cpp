@@ -100,26 +100,6 @@ bool is_existing(const fs::path& file) {
   return fs::symlink_status(file, missing).type() != fs::file_type::not_found;
 }
 
-/// Returns the outputs in a folder of results that an earlier version wrote, without their list:
-/// kResults, records of steps, and fixes of drives that are recorded or `planned`. A run that was
-/// interrupted has fixes of a drive without its record.
-std::set<std::string> find_unlisted_outputs(const fs::path& results,
-                                            const std::vector<StepOutputs>& planned) {
-  std::set<std::string> names(kResults.begin(), kResults.end());
-  for (const char* step : kNamedSteps) names.insert(step_record_file_name(step));
-  const auto insert_drive = [&](const std::string& step) {
-    names.insert({step_record_file_name(step), std::string(step).append(kFixesEnd)});
-  };
-  for (const auto& entry : fs::directory_iterator(results / "steps")) {
-    const std::string step = entry.path().stem().string();
-    if (is_drive_name(step) && read_step_record(entry.path())) insert_drive(step);
-  }
-  for (const auto& [step, files] : planned) {
-    if (is_drive_name(step)) insert_drive(step);
-  }
-  return names;
-}
-
 /// Returns true for names that runs can have written: kResults, records of steps, and fixes of
 /// drives. The list of outputs is in a folder that others may write to.
 bool is_output_name(std::string_view name) {
@@ -180,7 +160,11 @@ fs::path SessionResults::step_record_file(const std::string& step) const {
 std::set<std::string> SessionResults::list_recorded_output_files() const {
   constexpr std::size_t max_bytes = 1 << 20;
   const auto list = make_steps_folder(folder_).read_file_if_exists(kOutputs, max_bytes);
-  if (!list) return find_unlisted_outputs(folder_, steps_);
+  // Foreign files could not be distinguished from outputs.
+  if (!list) {
+    throw InputError(folder_ / "steps" / kOutputs,
+                     "was removed; choose another folder, or delete these results");
+  }
   std::set<std::string> names;
   std::istringstream lines(*list);
   for (std::string name; std::getline(lines, name);) {
@@ -203,7 +187,7 @@ std::set<std::string> SessionResults::remove_unwanted_output_files(
 
 void SessionResults::write_output_list(const std::set<std::string>& names) const {
   const SharedFolder records = make_steps_folder(folder_);
-  if (names == list_recorded_output_files() && records.contains_folder_entry(kOutputs)) return;
+  if (names == list_recorded_output_files()) return;
   std::string list;
   for (const std::string& name : names) list.append(name).append("\n");
   records.replace_file_atomically(kOutputs, list);

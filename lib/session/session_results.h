@@ -37,8 +37,8 @@ void write_refusal_junit_xml(const std::filesystem::path& results,
 ///   steps/outputs                 names of all files above that runs wrote or may have written
 ///   steps/lock                    locked while a run uses the folder
 ///
-/// Only files named in steps/outputs are ever removed or overwritten. If this file is missing, as
-/// in folders of earlier versions, all names count that the steps of those versions could write.
+/// Only files named in steps/outputs are ever removed or overwritten. A folder without this file is
+/// refused when its outputs are planned or published.
 class SessionResults {
  public:
   /// Locks the folder for this session, or for any if it is empty, and creates it if missing. The

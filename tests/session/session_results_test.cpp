@@ -191,16 +191,12 @@ TEST_F(SessionResultsTest, KeepsListingOutputsThatCouldNotBeRemoved) {
   EXPECT_FALSE(fs::exists(results / "lens.svg"));
 }
 
-TEST_F(SessionResultsTest, SetStepsAcceptsPlannedOutputsIfListIsMissing) {
+TEST_F(SessionResultsTest, SetStepsThrowsIfOutputListWasRemoved) {
   { const SessionResults taken(results, session); }
   fs::remove(results / "steps/outputs");
-  folder.file("results/line-x-fixes.csv", "of a drive whose step is not recorded");
-  folder.file("results/steps/line-x.json", "cannot be read");
-  folder.file("results/line-y-fixes.csv", "of no drive of the session");
   SessionResults now(results, session);
-  EXPECT_NO_THROW(now.set_steps({{"line-x", {"line-x-fixes.csv"}}}));
-  EXPECT_TRUE(fs::exists(results / "line-x-fixes.csv"));
-  EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
+  EXPECT_THAT([&] { now.set_steps(kPlan); },
+              ThrowsMessage<InputError>(HasSubstr("steps/outputs: was removed")));
 }
 
 TEST_F(SessionResultsTest, RemovesOutputsOfDrivesWithLongNames) {
@@ -224,29 +220,6 @@ TEST_F(SessionResultsTest, RejectsSymbolicLinkInPlaceOfOutput) {
   EXPECT_THAT([&] { taken.set_steps(kPlan); },
               ThrowsMessage<InputError>(HasSubstr("holds lens.yaml, which is not of")));
   EXPECT_EQ(TemporaryFolder::read_content(folder / "mine.txt"), "mine");
-}
-
-TEST_F(SessionResultsTest, RemovesOutputsOfRecordedStepsIfOutputListIsMissing) {
-  {
-    SessionResults before(results, session);
-    std::vector<StepOutputs> with_drive = kPlan;
-    with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
-    before.set_steps(with_drive);
-    keep_two_steps(before);
-    before.set_steps(with_drive);
-    folder.file("results/line-x-fixes.csv", "of a drive");
-    before.store_step_result("line-x", "key", StepResult());
-  }
-  fs::remove(results / "steps/outputs");
-  folder.file("results/line-y-fixes.csv", "mine");
-  folder.file("results/rotation-fixes.csv", "mine");
-  SessionResults now(results, session);
-  now.set_steps(kPlan);
-  now.publish_outputs();
-  EXPECT_TRUE(now.find_cached_step_result("lens", "key of the lens"));
-  EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
-  EXPECT_TRUE(fs::exists(results / "line-y-fixes.csv"));
-  EXPECT_TRUE(fs::exists(results / "rotation-fixes.csv")) << "only drives have fixes";
 }
 
 TEST_F(SessionResultsTest, RemoveOutputsOfLaterStepsKeepsNamedStep) {

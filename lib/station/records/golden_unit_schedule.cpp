@@ -147,11 +147,8 @@ std::string hash_measurement_settings(const StationConfig& config) {
   lines.add({{"blur_fraction", limits.max_blur_fraction},
              {"dark_fraction", limits.min_bright_fraction},
              {"same_pose_fraction", limits.same_view_fraction},
+             {"white_fraction", limits.max_white_fraction},
              {"max_consecutive_rejections", config.max_consecutive_rejections}});
-  // Stations without the key keep their digest.
-  if (limits.max_white_fraction != FrontendOptions().max_white_fraction) {
-    lines.add("white_fraction", limits.max_white_fraction);
-  }
   add_gates(config.gates, lines);
   if (const auto& golden = config.golden_unit) {
     lines.add("golden", golden->camera_id);
