@@ -149,7 +149,7 @@ RunRecord run_with(const std::string& name, int number) {
   run.libraries = "none";
   run.config_sha256 = std::string(64, 'a');
   run.images = {{"boards", name, std::string(64, 'b'), name}};
-  run.events = {{"20261121T134501.000001Z-" + std::to_string(number), kVoided, name, name}};
+  run.events = {{"20261121T134501Z-" + std::to_string(number), kVoided, name, name}};
   return run;
 }
 

@@ -292,7 +292,8 @@ void print_station_run_details(const StationRecordsOptions& options) {
   fmt::print("images     {}, {} used\n", record.images.size(), record.count_used_images());
   for (const RunEvent& event : record.events) {
     const std::string who = event.author.empty() ? "" : event.author + ": ";
-    print_line(fmt::format("{:<11} {} {}{}", event.kind, event.event_time_utc(), who, event.text));
+    print_line(fmt::format("{:<11} {} {}{}", event.kind, start_utc_of_run_id(event.event), who,
+                           event.text));
   }
 }
 

@@ -23,8 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kRunLength = 33;  // of make_run_id()
-
 bool is_older(const std::string& utc, int days) {
   constexpr double seconds_per_day = 86'400;
   return compute_age_of_utc_s(utc) > days * seconds_per_day;  // false for an invalid time
@@ -108,7 +106,7 @@ bool is_in_use(const fs::path& folder, const StationConfig& config) {
 void add_if_expired(RetentionResult& found, Records& records, const StationConfig& config,
                     const fs::path& folder, const std::string& camera, const std::string& run,
                     const char* what, int days) {
-  if (run.size() != kRunLength || !is_older(start_utc_of_run_id(run), days)) return;
+  if (!is_run_id(run) || !is_older(start_utc_of_run_id(run), days)) return;
   auto record = records.find_run_by_id(run);
   if (!record || record->camera != camera) {
     found.folders_without_record.push_back(folder);
@@ -144,9 +142,8 @@ RetentionResult find_expired_run_folders(const StationConfig& config, Records& r
   if (const auto& days = config.retention.images_days) {
     for (const fs::path& folder : list_folders_in(config.captures)) {
       const std::string name = folder.filename().string();
-      if (name.size() < kRunLength + 2) continue;
-      const std::size_t dot = name.size() - kRunLength - 1;
-      if (name[dot] != '.') continue;
+      const auto dot = name.rfind('.');
+      if (dot == std::string::npos) continue;
       add_if_expired(found, records, config, folder, name.substr(0, dot), name.substr(dot + 1),
                      kImagesDeleted, *days);
     }

@@ -25,7 +25,6 @@
 
 #include "calibration/intrinsics/mrcal_files.h"
 #include "captures/csv_writer.h"
-#include "captures/id.h"
 #include "captures/number_text.h"
 #include "captures/printable.h"
 #include "captures/shared_folder.h"
@@ -55,18 +54,6 @@ std::optional<std::time_t> parse_utc(const std::string& text) {
   std::tm parts{};
   const char* end = ::strptime(text.c_str(), kUtcFormat, &parts);
   return end != nullptr && *end == '\0' ? std::optional(::timegm(&parts)) : std::nullopt;
-}
-
-struct SplitTime {
-  std::time_t second = 0;
-  long long microsecond = 0;  // of that second
-};
-
-SplitTime split_current_time() {
-  using namespace std::chrono;
-  const auto now = system_clock::now();
-  const auto second = floor<seconds>(now);
-  return {system_clock::to_time_t(second), duration_cast<microseconds>(now - second).count()};
 }
 
 /// Returns the account that runs this program, and its machine.
@@ -153,11 +140,14 @@ std::string describe_why_verdict_is_void_or_edited(const RunRecord& record) {
 }
 
 std::string make_run_id() {
-  const auto [second, microsecond] = split_current_time();
+  using namespace std::chrono;
+  const auto now = system_clock::now();
+  const auto second = floor<seconds>(now);
   std::random_device random;
   std::uniform_int_distribution<std::uint64_t> eleven_digits(0, 0xfff'ffff'ffff);
-  return format_utc(second, "%Y%m%dT%H%M%SZ-") +
-         fmt::format("{:05x}{:011x}", microsecond, eleven_digits(random));
+  return format_utc(system_clock::to_time_t(second), "%Y%m%dT%H%M%SZ-") +
+         fmt::format("{:05x}{:011x}", duration_cast<microseconds>(now - second).count(),
+                     eleven_digits(random));
 }
 
 bool is_run_id(const std::string& text) {
@@ -171,19 +161,11 @@ std::string start_utc_of_run_id(const std::string& run) {
          run.substr(11, 2) + ":" + run.substr(13, 3);
 }
 
-std::string RunEvent::event_time_utc() const {
-  return start_utc_of_run_id(event.substr(0, event.find('.')) + "Z");
-}
-
 RunEvent make_run_event_now(const std::string& kind, const std::string& text,
                             const std::string& operator_name) {
-  const auto [second, microsecond] = split_current_time();
-  std::random_device random;
-  return {
-      format_utc(second, "%Y%m%dT%H%M%S") + fmt::format(".{:06d}Z-{:08x}", microsecond, random()),
-      kind, text,
-      operator_name.empty() ? describe_account()
-                            : fmt::format("{} ({})", operator_name, describe_account())};
+  return {make_run_id(), kind, text,
+          operator_name.empty() ? describe_account()
+                                : fmt::format("{} ({})", operator_name, describe_account())};
 }
 
 double compute_age_of_utc_s(const std::string& utc) {

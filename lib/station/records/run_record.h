@@ -18,7 +18,7 @@ namespace vlp {
 
 /// Event of a run after its verdict. Events are only added, never changed or removed.
 struct RunEvent {
-  /// Id of this event, unique; ids sort chronologically: 20261121T134501.123456Z-01234567.
+  /// Unique id of this event, with its time (make_run_id()).
   std::string event;
   /// Kind of the event: one of the constants below.
   std::string kind;
@@ -26,9 +26,6 @@ struct RunEvent {
   std::string text;
   /// Operator, if given, with account and machine of the program.
   std::string author = {};
-
-  /// Returns the time of the event, as 2026-11-21T13:45:01Z.
-  std::string event_time_utc() const;
 };
 inline constexpr const char *kHookRequested = "hook wanted", *kHookDone = "hook done",
                             *kHookFailed = "hook failed", *kImagesDeleted = "images deleted",
@@ -130,13 +127,14 @@ struct RunField {
 /// and another kSchemaVersion.
 std::span<const RunField> list_run_text_fields();
 
-/// Returns the id of a run that starts now, 20261121T134501Z-0123456789abcdef: UTC, microseconds in
-/// 5 hexadecimal digits and 11 random ones. Ids sort by time to the microsecond, unless the clock
-/// is set back.
+/// Returns the id of a run that starts now, or of an event, 20261121T134501Z-0123456789abcdef: UTC,
+/// microseconds in 5 hexadecimal digits and 11 random ones. Ids sort by time to the microsecond,
+/// unless the clock is set back.
 std::string make_run_id();
 /// Returns true if a text has the form of make_run_id().
 bool is_run_id(const std::string& text);
-/// Returns the UTC of the start of a run, as 2026-11-21T13:45:01Z; empty if `run` is no run id.
+/// Returns the UTC of the start of a run or of an event, as 2026-11-21T13:45:01Z; empty if `run` is
+/// no id.
 std::string start_utc_of_run_id(const std::string& run);
 std::string get_current_utc();
 /// Returns the problem of a UTC of a filter: 2026-11-21T13:45:01Z, or a prefix that includes the
@@ -146,7 +144,7 @@ std::string describe_utc_problem(const std::string& text);
 /// invalid text.
 double compute_age_of_utc_s(const std::string& utc);
 
-/// Returns the run with texts that are safe for terminals, reports and the spool:
+/// Returns the run with texts that are safe for terminals, reports and records:
 /// escape_text_for_terminal(), and escape_text_for_single_line() for operators and for names of
 /// images and events.
 RunRecord escape_texts_of_run(RunRecord run);

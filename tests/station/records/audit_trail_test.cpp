@@ -23,8 +23,8 @@ using testing::StartsWith;
 
 const std::string kRun1 = numbered_run_id(1), kRun2 = numbered_run_id(2),
                   kRun3 = numbered_run_id(3);
-const std::string kLabel = "20261121T134505.000000Z-00000001",
-                  kDeleted = "20261121T134506.000000Z-00000002";
+const std::string kLabel = "20261121T134505Z-0000000000000001",
+                  kDeleted = "20261121T134506Z-0000000000000002";
 
 /// Stores entries 1 to 5: runs 1 and 2, the hook of 2, run 3, and the deletion of its images.
 void keep_three(const std::string& where) {
