@@ -199,7 +199,7 @@ LITERAL = re.compile(r"""//[^\n]*|'(?:\\.|[^'\\\n])'|"((?:\\.|[^"\\])*)\"""")
 SCRIPT_MESSAGE = re.compile(r"\b(refuse|usage|fail)\b|ValueError\(|reprocess\.sh: |>&2")
 PYTHON_VALUE = re.compile(r"\{\{|\}\}|\{[^{}]*\}")
 SHELL_VALUE = re.compile(r"\$\{[^}]*\}|\$[a-z0-9_]+")
-REPORTS = re.compile(r"\bthrow\b|\bfail\(|\berror\(|\bwarn\(|\bwarnings\b|Error\(")
+REPORTS = re.compile(r"\bthrow\b|\.check\(|\bfail\(|\berror\(|\bwarn\(|\bwarnings\b|Error\(")
 ASKS = re.compile(r"\?( [A-Z]| ?$)|\badd\b|[:;] take ")
 CONTINUES = re.compile(r"[ ,;:'?)]")
 

@@ -119,26 +119,26 @@ std::vector<Gate> parse_gates(const std::vector<std::string>& texts,
 }
 
 std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKind>& known) {
-  YamlMap map = value.read_yaml_mapping();
+  YamlMap map = value.read_mapping();
   std::vector<Gate> gates;
   for (const MetricKind& kind : known) {
-    const auto limit = map.get_optional_yaml_value(kind.name);
+    const auto limit = map.find(kind.name);
     if (!limit) continue;
-    gates.push_back({kind.name, limit->read_yaml_number()});
+    gates.push_back({kind.name, limit->read_number()});
     const std::string problem = describe_invalid_limit(kind, gates.back().limit);
-    if (!problem.empty()) throw limit->make_yaml_error(problem);
+    if (!problem.empty()) throw limit->make_error(problem);
   }
-  map.check_all_yaml_keys_read();
+  map.check_all_keys_read();
   if (gates.empty())
-    throw value.make_yaml_error("contains no gate; the gates are: " + join_names(known));
+    throw value.make_error("contains no gate; the gates are: " + join_names(known));
   return gates;
 }
 
 std::vector<Gate> read_gates(const std::filesystem::path& file,
                              const std::vector<MetricKind>& known) {
   YamlMap document = read_yaml_file(file, "vlp-gates/1");
-  const YamlValue gates = document.get_required_yaml_value("gates");
-  document.check_all_yaml_keys_read();
+  const YamlValue gates = document.require("gates");
+  document.check_all_keys_read();
   return read_gates(gates, known);
 }
 

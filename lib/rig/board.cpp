@@ -35,10 +35,10 @@ constexpr double kMaxPrintSd = 0.02;  // check_board_layout() detects larger err
 std::size_t find_word(const YamlValue& value, const auto& names, const std::string& introduction) {
   std::string list;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (value.read_yaml_string() == names[i]) return i;
+    if (value.read_text() == names[i]) return i;
     list += (i == 0 ? "" : ", ") + std::string(names[i]);
   }
-  throw value.make_unknown_yaml_word_error(introduction + list);
+  throw value.make_unknown_word_error(introduction + list);
 }
 
 IdOrder read_id_order(const YamlValue& value) {
@@ -62,31 +62,27 @@ Board make_board_of_squares(BoardKind kind) {
 
 Board read_squares(YamlMap& map, BoardKind kind) {
   Board board = make_board_of_squares(kind);
-  board.cols = map.get_required_yaml_value("cols").read_yaml_integer_within(kMinSquaresPerSide,
-                                                                            kMaxTagsPerSide);
-  board.rows = map.get_required_yaml_value("rows").read_yaml_integer_within(kMinSquaresPerSide,
-                                                                            kMaxTagsPerSide);
-  board.square_size_m = map.get_required_yaml_value("square_size_m")
-                            .read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
+  board.cols = map.require("cols").read_integer({kMinSquaresPerSide, kMaxTagsPerSide});
+  board.rows = map.require("rows").read_integer({kMinSquaresPerSide, kMaxTagsPerSide});
+  board.square_size_m = map.require("square_size_m").read_number({kMinTag_m, kMaxTag_m, "m"});
   if (kind == BoardKind::chessboard) return board;
-  const YamlValue marker = map.get_required_yaml_value("marker_size_m");
-  board.tag_size_m = marker.read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
+  const YamlValue marker = map.require("marker_size_m");
+  board.tag_size_m = marker.read_number({kMinTag_m, kMaxTag_m, "m"});
   if (!(board.tag_size_m < board.square_size_m)) {
-    throw marker.make_yaml_error("a marker is smaller than the square around it");
+    throw marker.make_error("a marker is smaller than the square around it");
   }
-  const YamlValue dictionary = map.get_required_yaml_value("dictionary");
-  board.family = dictionary.read_yaml_string();
+  const YamlValue dictionary = map.require("dictionary");
+  board.family = dictionary.read_text();
   if (!board.family.starts_with("DICT_")) {
-    throw dictionary.make_yaml_error(
-        "should be one of OpenCV's dictionaries, such as DICT_5X5_100");
+    throw dictionary.make_error("should be one of OpenCV's dictionaries, such as DICT_5X5_100");
   }
-  if (const auto first = map.get_optional_yaml_value("first_id")) {
-    board.first_id = first->read_yaml_integer_within(0, kMaxId);
+  if (const auto first = map.find("first_id")) {
+    board.first_id = first->read_integer({0, kMaxId});
   }
-  if (const auto top_left = map.get_optional_yaml_value("top_left")) {
-    board.top_left_white = top_left->read_yaml_string() == "white";
-    if (!board.top_left_white && top_left->read_yaml_string() != "black") {
-      throw top_left->make_unknown_yaml_word_error("the colors of a square are: black, white");
+  if (const auto top_left = map.find("top_left")) {
+    board.top_left_white = top_left->read_text() == "white";
+    if (!board.top_left_white && top_left->read_text() != "black") {
+      throw top_left->make_unknown_word_error("the colors of a square are: black, white");
     }
   }
   return board;
@@ -95,19 +91,15 @@ Board read_squares(YamlMap& map, BoardKind kind) {
 /// Reads Kalibr's checkerboard, which counts corners.
 Board read_kalibr_checkerboard(YamlMap& map) {
   Board board = make_board_of_squares(BoardKind::chessboard);
-  board.cols = map.get_required_yaml_value("targetCols")
-                   .read_yaml_integer_within(kMinSquaresPerSide - 1, kMaxTagsPerSide - 1) +
-               1;
-  board.rows = map.get_required_yaml_value("targetRows")
-                   .read_yaml_integer_within(kMinSquaresPerSide - 1, kMaxTagsPerSide - 1) +
-               1;
-  const YamlValue height = map.get_required_yaml_value("rowSpacingMeters");
-  board.square_size_m = map.get_required_yaml_value("colSpacingMeters")
-                            .read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
+  board.cols =
+      map.require("targetCols").read_integer({kMinSquaresPerSide - 1, kMaxTagsPerSide - 1}) + 1;
+  board.rows =
+      map.require("targetRows").read_integer({kMinSquaresPerSide - 1, kMaxTagsPerSide - 1}) + 1;
+  const YamlValue height = map.require("rowSpacingMeters");
+  board.square_size_m = map.require("colSpacingMeters").read_number({kMinTag_m, kMaxTag_m, "m"});
   constexpr double rounding = 1e-9;
-  if (std::abs(height.read_yaml_number_within(kMinTag_m, kMaxTag_m, "m") - board.square_size_m) >
-      rounding) {
-    throw height.make_yaml_error("is not colSpacingMeters: the lens is found from squares");
+  if (std::abs(height.read_number({kMinTag_m, kMaxTag_m, "m"}) - board.square_size_m) > rounding) {
+    throw height.make_error("is not colSpacingMeters: the lens is found from squares");
   }
   return board;
 }
@@ -118,10 +110,10 @@ void check_family_has_tags(const Board& board, const YamlValue& rows) {
   const int size = kFamilySizes[static_cast<std::size_t>(family)];
   const int tags = board.cols * board.rows;
   if (board.first_id <= size - tags) return;
-  throw rows.make_yaml_error("a board of " + std::to_string(tags) + " tags from id " +
-                             std::to_string(board.first_id) + " needs more than the " +
-                             std::to_string(size) + " tags of " + board.family +
-                             "; correct cols, rows, or the first id");
+  throw rows.make_error("a board of " + std::to_string(tags) + " tags from id " +
+                        std::to_string(board.first_id) + " needs more than the " +
+                        std::to_string(size) + " tags of " + board.family +
+                        "; correct cols, rows, or the first id");
 }
 
 /// Names of the keys of an AprilGrid in the files of a calibration tool.
@@ -135,24 +127,21 @@ constexpr GridKeys kYacKeys{"tag_cols", "tag_rows", "tag_size", "tag_spacing"};
 /// Kalibr's documentation: tag36h11 with a border of two bits and squares at the corners. Ids count
 /// from codeOffset, or 0, along the rows from the bottom left.
 Board read_grid_target(YamlMap& map) {
-  if (const auto kind = map.get_optional_yaml_value("target_type")) {
-    if (kind->read_yaml_string() == "checkerboard") return read_kalibr_checkerboard(map);
-    if (kind->read_yaml_string() != "aprilgrid") {
-      throw kind->make_yaml_error(
-          "should be aprilgrid or checkerboard; from others no lens is found");
+  if (const auto kind = map.find("target_type")) {
+    if (kind->read_text() == "checkerboard") return read_kalibr_checkerboard(map);
+    if (kind->read_text() != "aprilgrid") {
+      throw kind->make_error("should be aprilgrid or checkerboard; from others no lens is found");
     }
   }
-  const GridKeys& keys = map.has_yaml_key(kYacKeys.cols) ? kYacKeys : kKalibrKeys;
+  const GridKeys& keys = map.has(kYacKeys.cols) ? kYacKeys : kKalibrKeys;
   Board board{"tag36h11", 0, 0, 0, 0, 2, true, 0, {false, BoardCorner::bottom_left}};
-  board.cols = map.get_required_yaml_value(keys.cols).read_yaml_integer_within(1, kMaxTagsPerSide);
-  const YamlValue rows = map.get_required_yaml_value(keys.rows);
-  board.rows = rows.read_yaml_integer_within(1, kMaxTagsPerSide);
-  board.tag_size_m =
-      map.get_required_yaml_value(keys.size).read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
-  board.tag_spacing =
-      map.get_required_yaml_value(keys.spacing).read_yaml_number_within(0.01, 10, "(gap / tag)");
-  if (const auto first = map.get_optional_yaml_value("codeOffset")) {
-    board.first_id = first->read_yaml_integer_within(0, kMaxId);
+  board.cols = map.require(keys.cols).read_integer({1, kMaxTagsPerSide});
+  const YamlValue rows = map.require(keys.rows);
+  board.rows = rows.read_integer({1, kMaxTagsPerSide});
+  board.tag_size_m = map.require(keys.size).read_number({kMinTag_m, kMaxTag_m, "m"});
+  board.tag_spacing = map.require(keys.spacing).read_number({0.01, 10, "(gap / tag)"});
+  if (const auto first = map.find("codeOffset")) {
+    board.first_id = first->read_integer({0, kMaxId});
   }
   check_family_has_tags(board, rows);
   return board;
@@ -166,25 +155,22 @@ std::string id_order_name(const IdOrder& order) {
 }
 
 Board read_board_from_yaml(YamlMap& map) {
-  const auto named = map.get_optional_yaml_value("kind");
+  const auto named = map.find("kind");
   const BoardKind kind =
       named ? static_cast<BoardKind>(find_word(*named, kKinds, "the kinds of boards are: "))
             : BoardKind::apriltags;
   if (kind != BoardKind::apriltags) return read_squares(map, kind);
   Board board;
-  board.family =
-      kFamilies[find_word(map.get_required_yaml_value("family"), kFamilies, "the families are: ")];
-  board.cols = map.get_required_yaml_value("cols").read_yaml_integer_within(1, kMaxTagsPerSide);
-  const YamlValue rows = map.get_required_yaml_value("rows");
-  board.rows = rows.read_yaml_integer_within(1, kMaxTagsPerSide);
-  board.tag_size_m =
-      map.get_required_yaml_value("tag_size_m").read_yaml_number_within(kMinTag_m, kMaxTag_m, "m");
-  board.tag_spacing =
-      map.get_required_yaml_value("tag_spacing").read_yaml_number_within(0.01, 10, "(gap / tag)");
-  board.border_bits = map.get_required_yaml_value("border_bits").read_yaml_integer_within(1, 2);
-  board.corner_squares = map.get_required_yaml_value("corner_squares").read_yaml_boolean();
-  board.first_id = map.get_required_yaml_value("first_id").read_yaml_integer_within(0, kMaxId);
-  board.id_order = read_id_order(map.get_required_yaml_value("id_order"));
+  board.family = kFamilies[find_word(map.require("family"), kFamilies, "the families are: ")];
+  board.cols = map.require("cols").read_integer({1, kMaxTagsPerSide});
+  const YamlValue rows = map.require("rows");
+  board.rows = rows.read_integer({1, kMaxTagsPerSide});
+  board.tag_size_m = map.require("tag_size_m").read_number({kMinTag_m, kMaxTag_m, "m"});
+  board.tag_spacing = map.require("tag_spacing").read_number({0.01, 10, "(gap / tag)"});
+  board.border_bits = map.require("border_bits").read_integer({1, 2});
+  board.corner_squares = map.require("corner_squares").read_boolean();
+  board.first_id = map.require("first_id").read_integer({0, kMaxId});
+  board.id_order = read_id_order(map.require("id_order"));
   check_family_has_tags(board, rows);
   return board;
 }
@@ -192,16 +178,15 @@ Board read_board_from_yaml(YamlMap& map) {
 Board read_board(const std::filesystem::path& file) {
   YamlMap document = read_yaml_file(file);
   for (const char* const key : {"calib_target", "calibration_target"}) {
-    if (const auto target = document.get_optional_yaml_value(key))
-      return target->convert_yaml_mapping(read_grid_target);
+    if (const auto target = document.find(key)) return target->convert_mapping(read_grid_target);
   }
-  const bool grid = document.has_yaml_key("target_type") || document.has_yaml_key(kKalibrKeys.cols);
-  if (!grid) check_yaml_file_format(document, kBoardFormat);
+  const bool grid = document.has("target_type") || document.has(kKalibrKeys.cols);
+  if (!grid) check_yaml_format(document, kBoardFormat);
   Board board = grid ? read_grid_target(document) : read_board_from_yaml(document);
-  if (const auto print_sd = grid ? std::nullopt : document.get_optional_yaml_value("print_sd")) {
-    board.print_sd = print_sd->read_yaml_number_within(0, kMaxPrintSd, "(relative)");
+  if (const auto print_sd = grid ? std::nullopt : document.find("print_sd")) {
+    board.print_sd = print_sd->read_number({0, kMaxPrintSd, "(relative)"});
   }
-  document.check_all_yaml_keys_read();
+  document.check_all_keys_read();
   return board;
 }
 

@@ -18,20 +18,20 @@ namespace vlp {
 namespace {
 
 LensModel read_lens_model(const YamlValue& value) {
-  if (const auto model = lens_model_from_name(value.read_yaml_string())) return *model;
-  throw value.make_unknown_yaml_word_error("the models are: " + list_lens_model_names());
+  if (const auto model = lens_model_from_name(value.read_text())) return *model;
+  throw value.make_unknown_word_error("the models are: " + list_lens_model_names());
 }
 
 Readout read_readout(const YamlValue& value) {
-  if (value.read_yaml_string() == "rows") return Readout::rows;
-  if (value.read_yaml_string() == "columns") return Readout::columns;
-  throw value.make_unknown_yaml_word_error("the readout is along rows or columns");
+  if (value.read_text() == "rows") return Readout::rows;
+  if (value.read_text() == "columns") return Readout::columns;
+  throw value.make_unknown_word_error("the readout is along rows or columns");
 }
 
 std::vector<double> read_intrinsics(const YamlValue& value, LensModel model) {
-  std::vector<double> intrinsics = value.read_yaml_numbers(num_lens_parameters(model));
+  std::vector<double> intrinsics = value.read_numbers(num_lens_parameters(model));
   if (intrinsics[0] <= 0 || intrinsics[1] <= 0) {
-    throw value.make_yaml_error("the focal lengths, the first two, should be positive");
+    throw value.make_error("the focal lengths, the first two, should be positive");
   }
   return intrinsics;
 }
@@ -44,19 +44,17 @@ constexpr double kMaxSd = 1e6;
 
 /// Reads the rows of the lower triangle, 1, 2, 3 ... numbers, after the rows of `known`.
 MatrixX read_covariance(const YamlValue& value, const MatrixX& known, Eigen::Index size) {
-  const auto list = value.read_yaml_list();
+  const auto list = value.read_list();
   if (std::ssize(list) != size - known.rows()) {
-    throw value.make_yaml_error("should be " + std::to_string(size - known.rows()) + " rows of " +
-                                std::to_string(known.rows() + 1) + ", " +
-                                std::to_string(known.rows() + 2) +
-                                " ... numbers, the lower triangle");
+    throw value.make_error("should be " + std::to_string(size - known.rows()) + " rows of " +
+                           std::to_string(known.rows() + 1) + ", " +
+                           std::to_string(known.rows() + 2) + " ... numbers, the lower triangle");
   }
   // All numbers are read first, so that the matrix is not larger than the file.
   std::vector<std::vector<double>> rows;
   rows.reserve(list.size());
   for (const YamlValue& item : list)
-    rows.push_back(
-        item.read_yaml_numbers(static_cast<std::size_t>(known.rows()) + rows.size() + 1));
+    rows.push_back(item.read_numbers(static_cast<std::size_t>(known.rows()) + rows.size() + 1));
   Eigen::MatrixXd matrix(size, size);
   matrix.topLeftCorner(known.rows(), known.rows()) = known;
   for (Eigen::Index row = known.rows(); row < size; ++row) {
@@ -70,12 +68,12 @@ MatrixX read_covariance(const YamlValue& value, const MatrixX& known, Eigen::Ind
       if (matrix(row, row) < 0 || matrix(row, col) * matrix(row, col) >
                                       matrix(row, row) * matrix(col, col) * (1 + rounding)) {
         // [FILE-5] `is not a covariance`
-        throw list[index].make_yaml_error("is not a covariance's: no correlation is beyond 1");
+        throw list[index].make_error("is not a covariance's: no correlation is beyond 1");
       }
     }
   }
   if (size > 0 && matrix.diagonal().maxCoeff() > kMaxSd * kMaxSd) {
-    throw value.make_yaml_error(
+    throw value.make_error(
         "states a standard deviation beyond 1,000,000: is it in the right unit?");
   }
   return matrix;
@@ -83,33 +81,31 @@ MatrixX read_covariance(const YamlValue& value, const MatrixX& known, Eigen::Ind
 
 /// Throws InputError if a part has a covariance beside joint_covariance.
 void check_no_covariance(const YamlMap& map, const std::string& program) {
-  if (map.has_yaml_key("covariance")) {
-    throw map.make_yaml_error("key 'covariance' is now in joint_covariance: run " + program +
-                              " again on the calibration from before it");
+  if (map.has("covariance")) {
+    throw map.make_error("key 'covariance' is now in joint_covariance: run " + program +
+                         " again on the calibration from before it");
   }
 }
 
 IntrinsicsReport read_intrinsics_report(YamlMap& map, Eigen::Index intrinsics) {
   IntrinsicsReport report;
-  report.views = map.get_required_yaml_value("views").read_yaml_integer_within(0, kLarge);
-  report.corners = map.get_required_yaml_value("corners").read_yaml_integer_within(0, kLarge);
-  report.outliers = map.get_required_yaml_value("outliers").read_yaml_integer_within(0, kLarge);
-  report.rms_px = map.get_required_yaml_value("rms_px").read_yaml_number_within(0, kInfinity, "px");
-  if (const auto value = map.get_optional_yaml_value("board_warp_m")) {
-    const auto warp = value->read_yaml_numbers(2);
+  report.views = map.require("views").read_integer({0, kLarge});
+  report.corners = map.require("corners").read_integer({0, kLarge});
+  report.outliers = map.require("outliers").read_integer({0, kLarge});
+  report.rms_px = map.require("rms_px").read_number({0, kInfinity, "px"});
+  if (const auto value = map.find("board_warp_m")) {
+    const auto warp = value->read_numbers(2);
     report.board_warp_m = {warp[0], warp[1]};
   }
-  report.expected_max_error_px =
-      map.get_optional_yaml_number("expected_max_error_px", 0, kInfinity, "px");
-  if (const auto value = map.get_optional_yaml_value("covariance")) {
+  map.optional("expected_max_error_px", report.expected_max_error_px, Range{0, kInfinity, "px"});
+  if (const auto value = map.find("covariance")) {
     report.covariance = read_covariance(*value, MatrixX(0, 0), intrinsics);
   }
-  if (const auto value = map.get_optional_yaml_value("valid_region_px")) {
-    for (const YamlValue& corner : value->read_yaml_list()) {
-      report.region_px.emplace_back(corner.read_yaml_numbers(2).data());
+  if (const auto value = map.find("valid_region_px")) {
+    for (const YamlValue& corner : value->read_list()) {
+      report.region_px.emplace_back(corner.read_numbers(2).data());
     }
-    if (report.region_px.size() < 3)
-      throw value->make_yaml_error("should have three corners or more");
+    if (report.region_px.size() < 3) throw value->make_error("should have three corners or more");
   }
   return report;
 }
@@ -117,75 +113,69 @@ IntrinsicsReport read_intrinsics_report(YamlMap& map, Eigen::Index intrinsics) {
 RotationCenter read_rotation_center(YamlMap& map) {
   check_no_covariance(map, "vlp-rotation");
   RotationCenter center;
-  const YamlValue model = map.get_required_yaml_value("model");
-  if (model.read_yaml_string() != "shift" && model.read_yaml_string() != "tilt") {
-    throw model.make_unknown_yaml_word_error("the models are: shift, tilt");
+  const YamlValue model = map.require("model");
+  if (model.read_text() != "shift" && model.read_text() != "tilt") {
+    throw model.make_unknown_word_error("the models are: shift, tilt");
   }
-  center.model = model.read_yaml_string() == "tilt" ? RotationModel::tilt : RotationModel::shift;
-  center.center_px =
-      Eigen::Vector2d(map.get_required_yaml_value("center_px").read_yaml_numbers(2).data());
-  const YamlValue zenith = map.get_required_yaml_value("zenith_in_camera");
-  center.zenith_in_camera = Eigen::Vector3d(zenith.read_yaml_numbers(3).data());
+  center.model = model.read_text() == "tilt" ? RotationModel::tilt : RotationModel::shift;
+  center.center_px = Eigen::Vector2d(map.require("center_px").read_numbers(2).data());
+  const YamlValue zenith = map.require("zenith_in_camera");
+  center.zenith_in_camera = Eigen::Vector3d(zenith.read_numbers(3).data());
   // Six digits, as typed by a person, suffice.
   if (std::abs(center.zenith_in_camera.norm() - 1) > 1e-5 || center.zenith_in_camera.z() <= 0) {
-    throw zenith.make_yaml_error("should be a unit vector with z > 0");
+    throw zenith.make_error("should be a unit vector with z > 0");
   }
-  if (const auto lever_arm = map.get_optional_yaml_value("lever_arm_m"))
-    center.lever_arm_m = Eigen::Vector2d(lever_arm->read_yaml_numbers(2).data());
+  if (const auto lever_arm = map.find("lever_arm_m"))
+    center.lever_arm_m = Eigen::Vector2d(lever_arm->read_numbers(2).data());
   return center;
 }
 
 Dispersion read_dispersion(YamlMap& map) {
   check_no_covariance(map, "vlp-dispersion");
   Dispersion dispersion;
-  dispersion.offset_px =
-      Eigen::Vector2d(map.get_required_yaml_value("offset_px").read_yaml_numbers(2).data());
-  dispersion.radius_m =
-      map.get_required_yaml_value("radius_m").read_yaml_number_within(0, kInfinity, "m");
-  dispersion.center_m =
-      Eigen::Vector2d(map.get_required_yaml_value("center_m").read_yaml_numbers(2).data());
-  dispersion.captures = map.get_required_yaml_value("captures").read_yaml_integer_within(1, kLarge);
+  dispersion.offset_px = Eigen::Vector2d(map.require("offset_px").read_numbers(2).data());
+  dispersion.radius_m = map.require("radius_m").read_number({0, kInfinity, "m"});
+  dispersion.center_m = Eigen::Vector2d(map.require("center_m").read_numbers(2).data());
+  dispersion.captures = map.require("captures").read_integer({1, kLarge});
   return dispersion;
 }
 
 Adjustment read_adjustment(YamlMap& map) {
   check_no_covariance(map, "vlp-adjust");
   Adjustment adjustment;
-  for (const YamlValue& item : map.get_required_yaml_value("sets").read_yaml_list())
-    adjustment.sets.push_back(item.read_yaml_string());
-  adjustment.captures = map.get_required_yaml_value("captures").read_yaml_integer_within(1, kLarge);
-  adjustment.detections =
-      map.get_required_yaml_value("detections").read_yaml_integer_within(1, kLarge);
-  adjustment.residual_px =
-      map.get_required_yaml_value("residual_px").read_yaml_number_within(0, kInfinity, "px");
+  for (const YamlValue& item : map.require("sets").read_list())
+    adjustment.sets.push_back(item.read_text());
+  adjustment.captures = map.require("captures").read_integer({1, kLarge});
+  adjustment.detections = map.require("detections").read_integer({1, kLarge});
+  adjustment.residual_px = map.require("residual_px").read_number({0, kInfinity, "px"});
   return adjustment;
 }
 
 JointCovariance::LampPosition read_lamp_position(YamlMap& map) {
-  return {map.get_required_yaml_value("id").read_yaml_integer_within(0, kLarge),
-          Eigen::Vector3d(map.get_required_yaml_value("position_m").read_yaml_numbers(3).data())};
+  return {map.require("id").read_integer({0, kLarge}),
+          Eigen::Vector3d(map.require("position_m").read_numbers(3).data())};
 }
 
 JointCovariance read_joint_covariance(YamlMap& map, const Calibration& calibration) {
   JointCovariance joint;
-  joint.lamps = map.get_required_yaml_value("lamps").convert_yaml_mapping_list(read_lamp_position);
+  joint.lamps = map.require("lamps").convert_mapping_list(read_lamp_position);
   std::vector<std::string> lamp_names;
   for (const auto& lamp : joint.lamps)
     std::ranges::move(list_lamp_parameter_names(lamp.id), std::back_inserter(lamp_names));
-  const YamlValue parameters = map.get_required_yaml_value("parameters");
-  const auto items = parameters.read_yaml_list();
+  const YamlValue parameters = map.require("parameters");
+  const auto items = parameters.read_list();
   const auto& report = calibration.intrinsics_report;
   MatrixX lens(0, 0);
   const auto read_names_if_next = [&](std::span<const std::string> names, bool is_required) {
     const std::size_t first = joint.parameters.size();
-    if (names.empty() || (!is_required && (first >= items.size() ||
-                                           items[first].read_yaml_string() != names.front())))
+    if (names.empty() ||
+        (!is_required && (first >= items.size() || items[first].read_text() != names.front())))
       return false;
     for (const std::string& name : names) {
       const std::size_t at = joint.parameters.size();
-      if (at >= items.size() || items[at].read_yaml_string() != name) {
+      if (at >= items.size() || items[at].read_text() != name) {
         // [FILE-4] `is missing in its place`
-        throw parameters.make_yaml_error(name + " is missing in its place");
+        throw parameters.make_error(name + " is missing in its place");
       }
       joint.parameters.push_back(name);
     }
@@ -193,14 +183,14 @@ JointCovariance read_joint_covariance(YamlMap& map, const Calibration& calibrati
   };
   if (read_names_if_next(list_intrinsics_names(calibration.camera), false)) {
     if (!report || !report->covariance)
-      throw parameters.make_yaml_error("has the lens, and intrinsics_report has no covariance");
+      throw parameters.make_error("has the lens, and intrinsics_report has no covariance");
     lens = *report->covariance;
   }
   const auto read_pair = [&](std::string_view name, bool is_known) {
     if (read_names_if_next(list_pair_names(name), false) && !is_known) {
       // [FILE-4] `which the calibration does not have`
-      throw parameters.make_yaml_error("has " + std::string(name) +
-                                       ", which the calibration does not have");
+      throw parameters.make_error("has " + std::string(name) +
+                                  ", which the calibration does not have");
     }
   };
   read_pair(kZenithParameter, calibration.rotation_center.has_value());
@@ -209,24 +199,21 @@ JointCovariance read_joint_covariance(YamlMap& map, const Calibration& calibrati
   read_pair(kOffsetParameter, calibration.dispersion.has_value());
   if (joint.parameters.size() < items.size()) {
     // [FILE-4] `is not in its place`
-    throw items[joint.parameters.size()].make_yaml_error(
+    throw items[joint.parameters.size()].make_error(
         "is not in its place: the order is lens, zenith, lever arm, lamps, offset");
   }
-  joint.matrix = read_covariance(map.get_required_yaml_value("rows"), lens, std::ssize(items));
+  joint.matrix = read_covariance(map.require("rows"), lens, std::ssize(items));
   return joint;
 }
 
 HistoryEntry::Input read_history_input(YamlMap& map) {
-  return {map.get_required_yaml_value("file").read_yaml_string(),
-          map.get_required_yaml_value("sha256").read_yaml_string()};
+  return {map.require("file").read_text(), map.require("sha256").read_text()};
 }
 
 HistoryEntry read_history_entry(YamlMap& map) {
-  return {map.get_required_yaml_value("part").read_yaml_string(),
-          map.get_required_yaml_value("program").read_yaml_string(),
-          map.get_required_yaml_value("version").read_yaml_string(),
-          map.get_required_yaml_value("options").read_yaml_string(),
-          map.get_required_yaml_value("inputs").convert_yaml_mapping_list(read_history_input)};
+  return {map.require("part").read_text(), map.require("program").read_text(),
+          map.require("version").read_text(), map.require("options").read_text(),
+          map.require("inputs").convert_mapping_list(read_history_input)};
 }
 
 void begin_yaml_section(YAML::Emitter& out, const char* key) {
@@ -350,36 +337,34 @@ void emit_history(YAML::Emitter& out, const std::vector<HistoryEntry>& history) 
 
 Camera read_camera_from_yaml(YamlMap& map) {
   Camera camera;
-  camera.id = map.get_required_yaml_value("id").read_yaml_string();
-  const YamlValue imager_px = map.get_required_yaml_value("imager_px");
-  const auto imager = imager_px.read_yaml_list();
-  if (imager.size() != 2) throw imager_px.make_yaml_error("should be [width, height]");
-  camera.imager_px = {imager[0].read_yaml_integer_within(1, 1 << 20),
-                      imager[1].read_yaml_integer_within(1, 1 << 20)};
-  camera.lens_model = read_lens_model(map.get_required_yaml_value("lens_model"));
-  camera.intrinsics = read_intrinsics(map.get_required_yaml_value("intrinsics"), camera.lens_model);
-  camera.pixel_pitch_m = map.get_optional_yaml_number("pixel_pitch_m", 1e-7, 1e-4, "m");
-  camera.row_time_s = map.get_optional_yaml_number("row_time_s", 1e-8, 1e-3, "s");
-  if (const auto value = map.get_optional_yaml_value("readout"))
-    camera.readout = read_readout(*value);
+  camera.id = map.require("id").read_text();
+  const YamlValue imager_px = map.require("imager_px");
+  const auto imager = imager_px.read_list();
+  if (imager.size() != 2) throw imager_px.make_error("should be [width, height]");
+  camera.imager_px = {imager[0].read_integer({1, 1 << 20}), imager[1].read_integer({1, 1 << 20})};
+  camera.lens_model = read_lens_model(map.require("lens_model"));
+  camera.intrinsics = read_intrinsics(map.require("intrinsics"), camera.lens_model);
+  map.optional("pixel_pitch_m", camera.pixel_pitch_m, Range{1e-7, 1e-4, "m"});
+  map.optional("row_time_s", camera.row_time_s, Range{1e-8, 1e-3, "s"});
+  if (const auto value = map.find("readout")) camera.readout = read_readout(*value);
   return camera;
 }
 
 Calibration read_calibration(const std::filesystem::path& file) {
   YamlMap document = read_yaml_file(file, "vlp-calibration/1");
   Calibration calibration;
-  const auto camera = document.get_required_yaml_value("camera");
-  const auto report = document.get_optional_yaml_value("intrinsics_report");
-  const auto rotation_center = document.get_optional_yaml_value("rotation_center");
-  const auto dispersion = document.get_optional_yaml_value("dispersion");
-  const auto adjustment = document.get_optional_yaml_value("adjustment");
-  const auto covariance = document.get_optional_yaml_value("joint_covariance");
-  const auto history = document.get_optional_yaml_value("history");
-  document.check_all_yaml_keys_read();
-  calibration.camera = camera.convert_yaml_mapping(read_camera_from_yaml);
+  const auto camera = document.require("camera");
+  const auto report = document.find("intrinsics_report");
+  const auto rotation_center = document.find("rotation_center");
+  const auto dispersion = document.find("dispersion");
+  const auto adjustment = document.find("adjustment");
+  const auto covariance = document.find("joint_covariance");
+  const auto history = document.find("history");
+  document.check_all_keys_read();
+  calibration.camera = camera.convert_mapping(read_camera_from_yaml);
   const auto read_if = [](const auto& value, const auto& read, const auto&... arguments) {
     const auto read_part = [&](YamlMap& map) { return read(map, arguments...); };
-    return value ? std::optional(value->convert_yaml_mapping(read_part)) : std::nullopt;
+    return value ? std::optional(value->convert_mapping(read_part)) : std::nullopt;
   };
   const Eigen::Index intrinsics = count_intrinsics_with_covariance(calibration.camera);
   calibration.intrinsics_report = read_if(report, read_intrinsics_report, intrinsics);
@@ -388,12 +373,12 @@ Calibration read_calibration(const std::filesystem::path& file) {
   calibration.dispersion = read_if(dispersion, read_dispersion);
   calibration.covariance = read_if(covariance, read_joint_covariance, calibration);
   if (!history) return calibration;
-  for (const YamlValue& item : history->read_yaml_list()) {
-    calibration.history.push_back(item.convert_yaml_mapping(read_history_entry));
+  for (const YamlValue& item : history->read_list()) {
+    calibration.history.push_back(item.convert_mapping(read_history_entry));
     const std::string& part = calibration.history.back().part;
     if ((part == "rotation_center" && !rotation_center) || (part == "dispersion" && !dispersion) ||
         (part == "adjustment" && !adjustment)) {
-      throw item.make_yaml_error("lists a part '" + part + "': is the file cut short?");
+      throw item.make_error("lists a part '" + part + "': is the file cut short?");
     }
   }
   return calibration;

@@ -24,33 +24,32 @@ constexpr double kMaxSurveySd_m = 1;  // larger values indicate millimeters
 
 Lamp read_lamp_from_yaml(YamlMap& map) {
   Lamp lamp;
-  lamp.id = map.get_required_yaml_value("id").read_yaml_integer_within(
-      0, std::numeric_limits<int>::max());
-  const auto position = map.get_required_yaml_value("position_m");
-  lamp.position_m = Eigen::Vector3d(position.read_yaml_numbers(3).data());
-  position.read_yaml_list()[2].read_yaml_number_within(-kMaxHeight_m, kMaxHeight_m, "m");
+  lamp.id = map.require("id").read_integer({0, std::numeric_limits<int>::max()});
+  const auto position = map.require("position_m");
+  lamp.position_m = Eigen::Vector3d(position.read_numbers(3).data());
+  position.read_list()[2].read_number({-kMaxHeight_m, kMaxHeight_m, "m"});
   lamp.shape = read_lamp_shape_from_yaml(map);
-  lamp.frequency_hz = map.get_optional_yaml_number("frequency_hz", 50, 1e6, "Hz");
-  lamp.duty = map.get_optional_yaml_number("duty", 0.01, 0.99, "(a fraction of the period)");
-  lamp.sd_m = map.get_optional_yaml_number("sd_m", 0, kMaxSurveySd_m, "m");
+  map.optional("frequency_hz", lamp.frequency_hz, Range{50, 1e6, "Hz"});
+  map.optional("duty", lamp.duty, Range{0.01, 0.99, "(a fraction of the period)"});
+  map.optional("sd_m", lamp.sd_m, Range{0, kMaxSurveySd_m, "m"});
   return lamp;
 }
 
-void UniqueLamps::check_lamp_id_and_position_unique(const Lamp& lamp, const YamlValue& item) const {
+void UniqueLamps::check_unique(const Lamp& lamp, const YamlMap& map) const {
   if (ids_.contains(lamp.id))
-    throw item.make_yaml_error("id " + std::to_string(lamp.id) + " occurs twice");
+    throw map.make_error("id " + std::to_string(lamp.id) + " occurs twice");
   const double x_m = lamp.position_m.x();
   const auto end = lamps_.upper_bound(x_m + kCoincident_m);
   for (auto near = lamps_.lower_bound(x_m - kCoincident_m); near != end; ++near) {
     const Lamp& other = near->second;
     if ((other.position_m - lamp.position_m).norm() < kCoincident_m) {
-      throw item.make_yaml_error("lamp " + std::to_string(lamp.id) + " is where lamp " +
-                                 std::to_string(other.id) + " is");
+      throw map.make_error("lamp " + std::to_string(lamp.id) + " is where lamp " +
+                           std::to_string(other.id) + " is");
     }
   }
 }
 
-void UniqueLamps::register_lamp_id_and_position(const Lamp& lamp) {
+void UniqueLamps::add(const Lamp& lamp) {
   ids_.insert(lamp.id);
   lamps_.emplace(lamp.position_m.x(), lamp);
 }
@@ -79,36 +78,37 @@ LampMap read_overhead_lamps_of_room(const std::filesystem::path& file, const std
 
 LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const std::string& room) {
   YamlMap document = read_yaml_file(file, kLampsFormat);
-  const auto sd_m = document.get_optional_yaml_number("sd_m", 0, kMaxSurveySd_m, "m");
-  const auto below = document.get_optional_yaml_value("lamps_below_camera");
-  const YamlValue list = document.get_required_yaml_value("lamps");
-  document.check_all_yaml_keys_read();
-  LampMapFile result{file, {{}, below && below->read_yaml_boolean()}, {}};
+  std::optional<double> sd_m;
+  document.optional("sd_m", sd_m, Range{0, kMaxSurveySd_m, "m"});
+  const auto below = document.find("lamps_below_camera");
+  const YamlValue list = document.require("lamps");
+  document.check_all_keys_read();
+  LampMapFile result{file, {{}, below && below->read_boolean()}, {}};
   UniqueLamps in_room;
   std::unordered_set<int> ids_of_other_rooms;
-  const auto items = list.read_yaml_list();
+  const auto items = list.read_list();
   std::vector<Lamp>& lamps = result.map.lamps;
   lamps.reserve(items.size());
   result.rooms.reserve(items.size());
   for (const YamlValue& item : items) {
-    YamlMap keys = item.read_yaml_mapping();
+    YamlMap keys = item.read_mapping();
     Lamp lamp = read_lamp_from_yaml(keys);
-    const auto lamp_room = keys.get_optional_yaml_value("room");
+    const auto lamp_room = keys.find("room");
     if (!room.empty() && !lamp_room) {
       // [LAMP-10] `no key room`
-      throw item.make_yaml_error("has no key room, and lamps of room " + room +
-                                 " are selected: state the room of each lamp");
+      throw item.make_error("has no key room, and lamps of room " + room +
+                            " are selected: state the room of each lamp");
     }
-    std::string room_name = lamp_room ? lamp_room->read_yaml_string() : "";
+    std::string room_name = lamp_room ? lamp_room->read_text() : "";
     const bool is_in_room = room.empty() || room_name == room;
     if (!lamp.sd_m) lamp.sd_m = sd_m;
-    keys.check_all_yaml_keys_read();
-    in_room.check_lamp_id_and_position_unique(lamp, item);
+    keys.check_all_keys_read();
+    in_room.check_unique(lamp, keys);
     if (ids_of_other_rooms.contains(lamp.id)) {
-      throw item.make_yaml_error("id " + std::to_string(lamp.id) + " occurs twice");
+      throw item.make_error("id " + std::to_string(lamp.id) + " occurs twice");
     }
     if (is_in_room) {
-      in_room.register_lamp_id_and_position(lamp);
+      in_room.add(lamp);
       lamps.push_back(std::move(lamp));
       result.rooms.push_back(std::move(room_name));
     } else {
@@ -119,7 +119,7 @@ LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const s
     throw InputError(
         file, "has no lamp with 'room: " + room + "': name another room, or correct the map");
   }
-  if (lamps.empty()) throw list.make_yaml_error("contains no lamp");
+  if (lamps.empty()) throw list.make_error("contains no lamp");
   return result;
 }
 

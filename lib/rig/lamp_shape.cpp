@@ -53,36 +53,33 @@ std::vector<Eigen::Vector3d> compute_lamp_outline_points(const LampShape& shape,
 
 LampShape read_lamp_shape_from_yaml(YamlMap& map) {
   LampShape shape;
-  const auto word = map.get_optional_yaml_value("shape");
+  const auto word = map.find("shape");
   if (word) {
-    const std::string name = word->read_yaml_string();
+    const std::string name = word->read_text();
     const auto* traits = std::ranges::find(kShapeTraits, name, &ShapeTraits::name);
-    if (traits == kShapeTraits.end()) throw word->make_unknown_yaml_word_error(list_names(false));
+    if (traits == kShapeTraits.end()) throw word->make_unknown_word_error(list_names(false));
     shape.kind = traits->kind;
   }
   const ShapeTraits& traits = get_lamp_shape_traits(shape.kind);
-  const auto diameter = map.get_optional_yaml_value("diameter_m");
-  const auto size = map.get_optional_yaml_value("size_m"),
-             yaw = map.get_optional_yaml_value("yaw_rad");
+  const auto diameter = map.find("diameter_m");
+  const auto size = map.find("size_m"), yaw = map.find("yaw_rad");
   if (!traits.has_two_sizes) {
     if (size || yaw) {
       const std::string names = list_names(true);
       throw(size ? size : yaw)
-          ->make_yaml_error("is of a " + names + ": say 'shape: " + names + "', too");
+          ->make_error("is of a " + names + ": say 'shape: " + names + "', too");
     }
-    return diameter ? make_disc_lamp_shape(
-                          diameter->read_yaml_number_within(kMinSize_m, kMaxSize_m, "m"))
+    return diameter ? make_disc_lamp_shape(diameter->read_number({kMinSize_m, kMaxSize_m, "m"}))
                     : shape;
   }
   if (diameter) {
-    throw diameter->make_yaml_error("is of a disc, and this is a " + std::string(traits.name) +
-                                    ": it has a size_m");
+    throw diameter->make_error("is of a disc, and this is a " + std::string(traits.name) +
+                               ": it has a size_m");
   }
-  const YamlValue sides = map.get_required_yaml_value("size_m");
-  shape.size_m = Eigen::Vector2d(sides.read_yaml_numbers(2).data());
-  if (yaw) shape.yaw_rad = yaw->read_yaml_number_within(-kMaxYaw_rad, kMaxYaw_rad, "rad");
-  for (const YamlValue& side : sides.read_yaml_list())
-    side.read_yaml_number_within(kMinSize_m, kMaxSize_m, "m");
+  const YamlValue sides = map.require("size_m");
+  shape.size_m = Eigen::Vector2d(sides.read_numbers(2).data());
+  if (yaw) shape.yaw_rad = yaw->read_number({-kMaxYaw_rad, kMaxYaw_rad, "rad"});
+  for (const YamlValue& side : sides.read_list()) side.read_number({kMinSize_m, kMaxSize_m, "m"});
   return shape;
 }
 

@@ -16,7 +16,7 @@ namespace vlp {
 
 /// Readers of the parts that several kinds of documents contain. Each reads the keys of `map` that
 /// are the fields of its result. The caller reads its own keys and calls
-/// check_all_yaml_keys_read(). All throw InputError if a value is invalid.
+/// check_all_keys_read(). All throw InputError if a value is invalid.
 Lamp read_lamp_from_yaml(YamlMap& map);
 /// Reads the shape of a lamp (kind, axis lengths in m, yaw in rad) from the keys of a lamp. The
 /// size is std::nullopt for a disc without diameter_m.
@@ -31,9 +31,9 @@ void emit_yaml_lamp_shape(YAML::Emitter& out, const LampShape& shape);
 /// Index of the lamps that were already read from a file, to find duplicates by id and position.
 class UniqueLamps {
  public:
-  /// Throws InputError at `item` if an added lamp has the same id or is within 1 mm.
-  void check_lamp_id_and_position_unique(const Lamp& lamp, const YamlValue& item) const;
-  void register_lamp_id_and_position(const Lamp& lamp);
+  /// Throws InputError at the lamp's mapping if an added lamp has the same id or is within 1 mm.
+  void check_unique(const Lamp& lamp, const YamlMap& map) const;
+  void add(const Lamp& lamp);
 
  private:
   std::unordered_set<int> ids_;

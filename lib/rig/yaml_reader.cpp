@@ -132,17 +132,15 @@ YamlMap::YamlMap(const YamlPart& node, const std::filesystem::path* file, std::s
   entries_.reserve(node->children.size() / 2);
   for (std::size_t i = 0; i + 1 < node->children.size(); i += 2) {
     const YamlNode &name = node->children[i], &value = node->children[i + 1];
-    if (name.kind != YamlNode::Kind::scalar)
-      throw make_yaml_error(name.line, "a key should be a word");
+    if (name.kind != YamlNode::Kind::scalar) throw make_error(name.line, "a key should be a word");
     if (!seen.insert(name.text).second) {
-      throw make_yaml_error(name.line,
-                            "key " + quote_text_for_message(name.text) + " occurs twice");
+      throw make_error(name.line, "key " + quote_text_for_message(name.text) + " occurs twice");
     }
     entries_.push_back({name.text, name.line, YamlPart(node, &value)});
   }
 }
 
-std::optional<YamlValue> YamlMap::get_optional_yaml_value(const std::string& key) {
+std::optional<YamlValue> YamlMap::find(const std::string& key) {
   if (std::find(known_.begin(), known_.end(), key) == known_.end()) known_.push_back(key);
   for (const Entry& entry : entries_) {
     if (entry.key != key) continue;
@@ -154,65 +152,62 @@ std::optional<YamlValue> YamlMap::get_optional_yaml_value(const std::string& key
   return std::nullopt;
 }
 
-bool YamlMap::has_yaml_key(const std::string& key) const {
+bool YamlMap::has(const std::string& key) const {
   return std::any_of(entries_.begin(), entries_.end(),
                      [&](const Entry& entry) { return entry.key == key; });
 }
 
-std::optional<double> YamlMap::get_optional_yaml_number(const std::string& key, double min,
-                                                        double max, std::string_view unit) {
-  const auto value = get_optional_yaml_value(key);
-  return value ? std::optional(value->read_yaml_number_within(min, max, unit)) : std::nullopt;
-}
-
-YamlValue YamlMap::get_required_yaml_value(const std::string& key) {
-  if (auto value = get_optional_yaml_value(key)) return *value;
+YamlValue YamlMap::require(const std::string& key) {
+  if (auto value = find(key)) return *value;
   std::string names;
   for (const Entry& entry : entries_) names += (names.empty() ? "" : ", ") + entry.key;
-  throw make_yaml_error(line_,
-                        "key '" + key + "' is missing; the keys are: " + truncate_text(names, 150));
+  throw make_error(line_,
+                   "key '" + key + "' is missing; the keys are: " + truncate_text(names, 150));
 }
 
-void YamlMap::check_all_yaml_keys_read() const {
+void YamlMap::check_all_keys_read() const {
   for (const Entry& entry : entries_) {
     if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
     std::string names;
     for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
-    throw make_yaml_error(entry.line, "key " + quote_text_for_message(entry.key) +
-                                          " is unknown; the keys are: " + names);
+    throw make_error(entry.line, "key " + quote_text_for_message(entry.key) +
+                                     " is unknown; the keys are: " + names);
   }
 }
 
-InputError YamlMap::make_yaml_error(const std::string& problem) const {
-  return make_yaml_error(line_, problem);
+void YamlMap::check(bool is_valid, std::string_view problem) const {
+  if (!is_valid) throw make_error(std::string(problem));
 }
 
-InputError YamlMap::make_yaml_error(std::size_t line, const std::string& problem) const {
+InputError YamlMap::make_error(const std::string& problem) const {
+  return make_error(line_, problem);
+}
+
+InputError YamlMap::make_error(std::size_t line, const std::string& problem) const {
   return {*file_, line, prefix_, problem};
 }
 
 YamlMap read_yaml_file(const std::filesystem::path& file) {
   const auto node =
       std::make_shared<YamlNode>(build_tree(file, read_text_file(file, kMaxYamlBytes)));
-  return YamlValue(node, &file, "", node->line).read_yaml_mapping();
+  return YamlValue(node, &file, "", node->line).read_mapping();
 }
 
 YamlMap read_yaml_file(const std::filesystem::path& file, const std::string& format) {
   YamlMap map = read_yaml_file(file);
-  check_yaml_file_format(map, format);
+  check_yaml_format(map, format);
   return map;
 }
 
-void check_yaml_file_format(YamlMap& map, const std::string& format) {
-  const auto found = map.get_optional_yaml_value("format");
+void check_yaml_format(YamlMap& map, const std::string& format) {
+  const auto found = map.find("format");
   if (!found) {
-    throw map.make_yaml_error(
-        "key 'format' is missing: the file should begin with 'format: " + format + "'");
+    throw map.make_error("key 'format' is missing: the file should begin with 'format: " + format +
+                         "'");
   }
-  if (found->read_yaml_string() != format) {
-    throw found->make_yaml_error("should be '" + format + "', not " +
-                                 quote_text_for_message(found->read_yaml_string()) +
-                                 ": is it the right file?");
+  if (found->read_text() != format) {
+    throw found->make_error("should be '" + format + "', not " +
+                            quote_text_for_message(found->read_text()) + ": is it the right file?");
   }
 }
 
@@ -235,68 +230,73 @@ YamlValue::YamlValue(YamlPart node, const std::filesystem::path* file, std::stri
                      std::size_t line)
     : node_(std::move(node)), file_(file), key_(std::move(key)), line_(line) {}
 
-double YamlValue::read_yaml_number() const {
+double YamlValue::read_number() const {
   const auto value = parse_number<double>(*node_);
   if (!value || !std::isfinite(*value)) {
-    throw make_yaml_error("should be a finite number, not " + describe_yaml_value(*node_));
+    throw make_error("should be a finite number, not " + describe_yaml_value(*node_));
   }
   return *value;
 }
 
-double YamlValue::read_yaml_number_within(double min, double max, std::string_view unit) const {
-  const double value = read_yaml_number();
-  if (value < min || value > max) {
+double YamlValue::read_number(const Range& range) const {
+  const double value = read_number();
+  if (value < range.min || value > range.max) {
+    const std::string unit(range.unit);
     // [FILE-3] `is it in the right unit?` | mm, us or degrees in place of m, s or rad; national
     //   coordinates with too many digits | convert
-    throw make_yaml_error(format_shortest_exact_number(value) + " " + std::string(unit) +
-                          " is not within " + format_shortest_exact_number(min) + " and " +
-                          format_shortest_exact_number(max) + " " + std::string(unit) +
-                          ": is it in the right unit?");
+    throw make_error(format_shortest_exact_number(value) + " " + unit + " is not within " +
+                     format_shortest_exact_number(range.min) + " and " +
+                     format_shortest_exact_number(range.max) + " " + unit +
+                     ": is it in the right unit?");
   }
   return value;
 }
 
-int YamlValue::read_yaml_integer_within(int min, int max) const {
+int YamlValue::read_integer(const Range& range) const {
   const auto value = parse_number<int>(*node_);
-  if (!value || *value < min || *value > max) {
-    throw make_yaml_error("should be a whole number within " + std::to_string(min) + " and " +
-                          std::to_string(max) + ", not " + describe_yaml_value(*node_));
+  if (!value || *value < range.min || *value > range.max) {
+    throw make_error(
+        "should be a whole number within " + std::to_string(static_cast<int>(range.min)) + " and " +
+        std::to_string(static_cast<int>(range.max)) + ", not " + describe_yaml_value(*node_));
   }
   return *value;
 }
 
-bool YamlValue::read_yaml_boolean() const {
+bool YamlValue::read_boolean() const {
   if (node_->kind == YamlNode::Kind::scalar && node_->text == "true") return true;
   if (node_->kind == YamlNode::Kind::scalar && node_->text == "false") return false;
-  throw make_yaml_error("should be true or false, not " + describe_yaml_value(*node_));
+  throw make_error("should be true or false, not " + describe_yaml_value(*node_));
 }
 
-std::string YamlValue::read_yaml_string() const {
+std::string YamlValue::read_text() const {
   if (node_->kind != YamlNode::Kind::scalar)
-    throw make_yaml_error("should be text, not " + describe_yaml_value(*node_));
+    throw make_error("should be text, not " + describe_yaml_value(*node_));
   return node_->text;
 }
 
-std::vector<double> YamlValue::read_yaml_numbers(std::size_t count) const {
+std::size_t YamlValue::read_word(const Words& words) const {
+  const std::string text = read_text();
+  std::string known(words.introduction);
+  for (std::size_t i = 0; i < words.names.size(); ++i) {
+    if (text == words.names[i]) return i;
+    known.append(i == 0 ? "" : words.separator).append(words.names[i]);
+  }
+  throw make_unknown_word_error(known);
+}
+
+std::vector<double> YamlValue::read_numbers(std::size_t count) const {
   std::vector<double> values;
-  for (const YamlValue& item : read_yaml_list()) values.push_back(item.read_yaml_number());
+  for (const YamlValue& item : read_list()) values.push_back(item.read_number());
   if (values.size() != count) {
-    throw make_yaml_error("should be " + std::to_string(count) + " numbers, not " +
-                          std::to_string(values.size()));
+    throw make_error("should be " + std::to_string(count) + " numbers, not " +
+                     std::to_string(values.size()));
   }
   return values;
 }
 
-std::vector<double> YamlValue::read_yaml_numbers_within(std::size_t count, double min, double max,
-                                                        std::string_view unit) const {
-  std::vector<double> values = read_yaml_numbers(count);
-  for (const YamlValue& item : read_yaml_list()) item.read_yaml_number_within(min, max, unit);
-  return values;
-}
-
-std::vector<YamlValue> YamlValue::read_yaml_list() const {
+std::vector<YamlValue> YamlValue::read_list() const {
   if (node_->kind != YamlNode::Kind::list)
-    throw make_yaml_error("should be a list, not " + describe_yaml_value(*node_));
+    throw make_error("should be a list, not " + describe_yaml_value(*node_));
   std::vector<YamlValue> items;
   items.reserve(node_->children.size());
   for (const YamlNode& item : node_->children) {
@@ -306,20 +306,32 @@ std::vector<YamlValue> YamlValue::read_yaml_list() const {
   return items;
 }
 
-YamlMap YamlValue::read_yaml_mapping() const {
+YamlMap YamlValue::read_mapping() const {
   if (node_->kind != YamlNode::Kind::map) {
-    throw make_yaml_error("should be a mapping of keys to values, not " +
-                          describe_yaml_value(*node_));
+    throw make_error("should be a mapping of keys to values, not " + describe_yaml_value(*node_));
   }
   return {node_, file_, key_};
 }
 
-InputError YamlValue::make_yaml_error(const std::string& problem) const {
+InputError YamlValue::make_error(const std::string& problem) const {
   return {*file_, line_, key_, problem};
 }
 
-InputError YamlValue::make_unknown_yaml_word_error(const std::string& known) const {
-  return make_yaml_error(describe_yaml_value(*node_) + " is unknown; " + known);
+InputError YamlValue::make_unknown_word_error(const std::string& known) const {
+  return make_error(describe_yaml_value(*node_) + " is unknown; " + known);
+}
+
+const YamlField& YamlField::check(bool is_valid, std::string_view problem) const {
+  if (value_ && !is_valid) throw value_->make_error(std::string(problem));
+  return *this;
+}
+
+void YamlField::check_within(const Range& range) const {
+  if (value_) value_->read_number(range);
+}
+
+YamlField YamlField::item(std::size_t index) const {
+  return value_ ? YamlField(value_->read_list().at(index)) : *this;
 }
 
 }  // namespace vlp

@@ -4,15 +4,21 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <Eigen/Core>
+#include <concepts>
 #include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
+#include "../geometry/angles.h"
 #include "input_error.h"
+#include "yaml_description.h"
 
 // Not installed, and not exported by the shared library.
 #pragma GCC visibility push(hidden)
@@ -41,32 +47,26 @@ class YamlValue {
  public:
   YamlValue(YamlPart node, const std::filesystem::path* file, std::string key, std::size_t line);
 
-  /// Returns a finite number. read_yaml_number_within() also throws InputError if it is outside
-  /// [min, max]; `unit` is for the message.
-  double read_yaml_number() const;
-  double read_yaml_number_within(double min, double max, std::string_view unit) const;
-  int read_yaml_integer_within(int min, int max) const;
-  bool read_yaml_boolean() const;
-  std::string read_yaml_string() const;
-  /// Returns a list of exactly `count` finite numbers. read_yaml_numbers_within() also checks each
-  /// one as read_yaml_number_within() does.
-  std::vector<double> read_yaml_numbers(std::size_t count) const;
-  std::vector<double> read_yaml_numbers_within(std::size_t count, double min, double max,
-                                               std::string_view unit) const;
-  std::vector<YamlValue> read_yaml_list() const;
-  YamlMap read_yaml_mapping() const;
-  /// Applies `read`, a function of a YamlMap&, to a mapping and returns its result. Throws
-  /// InputError if the mapping has a key that `read` has not read.
+  /// Return a finite number; an integer. Throw InputError if it is outside the range, too.
+  double read_number() const;
+  double read_number(const Range& range) const;
+  int read_integer(const Range& range) const;
+  bool read_boolean() const;
+  std::string read_text() const;
+  /// Returns the index of the value's word.
+  std::size_t read_word(const Words& words) const;
+  /// Returns a list of exactly `count` finite numbers.
+  std::vector<double> read_numbers(std::size_t count) const;
+  std::vector<YamlValue> read_list() const;
+  YamlMap read_mapping() const;
   template <typename Read>
-  auto convert_yaml_mapping(const Read& read) const;
-  /// Applies `read` as convert_yaml_mapping() does to each item of a list of mappings. Returns the
-  /// results in the order of the list.
+  auto convert_mapping(const Read& read) const;
   template <typename Read>
-  auto convert_yaml_mapping_list(const Read& read) const;
+  auto convert_mapping_list(const Read& read) const;
 
-  InputError make_yaml_error(const std::string& problem) const;
+  InputError make_error(const std::string& problem) const;
   /// Returns the error for a word that is not among the valid ones, `known`.
-  InputError make_unknown_yaml_word_error(const std::string& known) const;
+  InputError make_unknown_word_error(const std::string& known) const;
 
  private:
   YamlPart node_;
@@ -75,41 +75,67 @@ class YamlValue {
   std::size_t line_;
 };
 
-/// A mapping. The caller reads every valid key, then calls check_all_yaml_keys_read(). `file` must
+/// A value that a description has read, for further checks of it. They pass if the file lacks the
+/// value.
+class YamlField {
+ public:
+  YamlField(std::optional<YamlValue> value) : value_(std::move(value)) {}
+
+  /// Returns true if the file has the value.
+  explicit operator bool() const { return value_.has_value(); }
+  /// Throws InputError at the value if it is not valid.
+  const YamlField& check(bool is_valid, std::string_view problem) const;
+  /// Checks a number.
+  void check_within(const Range& range) const;
+  /// Returns an item of a list.
+  YamlField item(std::size_t index) const;
+
+ private:
+  std::optional<YamlValue> value_;
+};
+
+/// A mapping. The caller reads every valid key, then calls check_all_keys_read(). `file` must
 /// outlive it.
 class YamlMap {
  public:
+  static constexpr bool is_reader = true;
+
   YamlMap(const YamlPart& node, const std::filesystem::path* file, std::string key);
 
-  bool has_yaml_key(const std::string& key) const;
-  YamlValue get_required_yaml_value(const std::string& key);
-  std::optional<YamlValue> get_optional_yaml_value(const std::string& key);
-  /// Return the value of a key by YamlValue::read_yaml_number_within() or convert_yaml_mapping();
-  /// std::nullopt if the mapping lacks the key.
-  std::optional<double> get_optional_yaml_number(const std::string& key, double min, double max,
-                                                 std::string_view unit);
-  template <typename Read>
-  auto convert_optional_yaml_mapping(const std::string& key, const Read& read) {
-    const auto value = get_optional_yaml_value(key);
-    return value ? std::optional(value->convert_yaml_mapping(read)) : std::nullopt;
+  bool has(const std::string& key) const;
+  /// Returns the value of a key. Throws InputError if the mapping lacks it.
+  YamlValue require(const std::string& key);
+  std::optional<YamlValue> find(const std::string& key);
+  /// Read the value of a key into `target` by read_value(). optional() leaves `target` unchanged if
+  /// the mapping lacks the key.
+  template <typename T, typename... Limits>
+  YamlField required(const std::string& key, T&& target, const Limits&... limits) {
+    YamlValue value = require(key);
+    read_value(value, target, limits...);
+    return {std::move(value)};
   }
-  /// Returns the list of a key by YamlValue::convert_yaml_mapping_list(); an empty list if the
-  /// mapping lacks the key.
-  template <typename Read>
-  auto convert_yaml_mapping_list_or_empty(const std::string& key, const Read& read) {
-    const auto value = get_optional_yaml_value(key);
-    return value ? value->convert_yaml_mapping_list(read)
-                 : decltype(value->convert_yaml_mapping_list(read))();
+  template <typename T, typename... Limits>
+  YamlField optional(const std::string& key, T&& target, const Limits&... limits) {
+    auto value = find(key);
+    if (value) read_value(*value, target, limits...);
+    return {std::move(value)};
+  }
+  /// required() of a key that a writer writes after the others, so that a truncated file lacks it.
+  template <typename T>
+  YamlField required_last(const std::string& key, T& target) {
+    return required(key, target);
   }
   /// Checks that all keys of the mapping were read. Throws InputError for the first one that was
   /// not.
-  void check_all_yaml_keys_read() const;
+  void check_all_keys_read() const;
 
+  /// Throws InputError with `problem`, file, line and key of the mapping if it is not valid.
+  void check(bool is_valid, std::string_view problem) const;
   /// Returns an error with `problem`, file, line and key of the mapping, to be thrown.
-  InputError make_yaml_error(const std::string& problem) const;
+  InputError make_error(const std::string& problem) const;
 
  private:
-  InputError make_yaml_error(std::size_t line, const std::string& problem) const;
+  InputError make_error(std::size_t line, const std::string& problem) const;
 
   struct Entry {
     std::string key;
@@ -124,18 +150,83 @@ class YamlMap {
 };
 
 template <typename Read>
-auto YamlValue::convert_yaml_mapping(const Read& read) const {
-  YamlMap keys = read_yaml_mapping();
+auto YamlValue::convert_mapping(const Read& read) const {
+  YamlMap keys = read_mapping();
   auto result = read(keys);
-  keys.check_all_yaml_keys_read();
+  keys.check_all_keys_read();
   return result;
 }
 
 template <typename Read>
-auto YamlValue::convert_yaml_mapping_list(const Read& read) const {
-  std::vector<decltype(convert_yaml_mapping(read))> results;
-  for (const YamlValue& item : read_yaml_list()) results.push_back(item.convert_yaml_mapping(read));
+auto YamlValue::convert_mapping_list(const Read& read) const {
+  std::vector<decltype(convert_mapping(read))> results;
+  for (const YamlValue& item : read_list()) results.push_back(item.convert_mapping(read));
   return results;
+}
+
+/// Read a value into `target`; the items of a list, with the same limits. A mapping is read by
+/// describe(). A function of `target` and of a YamlValue, or of a YamlMap&, may be given in place
+/// of limits.
+/// @throws InputError if the value is invalid, or if a mapping has a key that was not read
+inline void read_value(const YamlValue& value, double& target) { target = value.read_number(); }
+inline void read_value(const YamlValue& value, double& target, const Range& range) {
+  target = value.read_number(range);
+}
+inline void read_value(const YamlValue& value, double& target, const DegreeRange& range) {
+  target = rad_from_deg(value.read_number({range.min, range.max, range.unit}));
+}
+inline void read_value(const YamlValue& value, int& target, const Range& range = kAnyIndex) {
+  target = value.read_integer(range);
+}
+inline void read_value(const YamlValue& value, bool& target) { target = value.read_boolean(); }
+inline void read_value(const YamlValue& value, std::string& target) { target = value.read_text(); }
+inline void read_value(const YamlValue& value, std::string& target, PlainText) {
+  target = value.read_text();
+}
+inline void read_value(const YamlValue& value, std::string& target, const Words& words) {
+  target = words.names[value.read_word(words)];
+}
+template <typename Enumeration>
+requires std::is_enum_v<Enumeration>
+void read_value(const YamlValue& value, Enumeration& target, const Words& words) {
+  target = static_cast<Enumeration>(value.read_word(words));
+}
+template <int N, typename... Limits>
+void read_value(const YamlValue& value, Eigen::Matrix<double, N, 1>& target,
+                const Limits&... limits) {
+  value.read_numbers(N);
+  for (Eigen::Index i = 0; const YamlValue& item : value.read_list())
+    read_value(item, target[i++], limits...);
+}
+template <typename... Limits>
+void read_value(const YamlValue& value, std::pair<double, double>& target,
+                const Limits&... limits) {
+  Eigen::Vector2d numbers;
+  read_value(value, numbers, limits...);
+  target = {numbers[0], numbers[1]};
+}
+template <typename T, typename Read>
+requires std::invocable<Read, const YamlValue&, T&>
+void read_value(const YamlValue& value, T& target, const Read& read) { read(value, target); }
+template <typename T, typename... Context>
+void read_value(const YamlValue& value, std::optional<T>& target, const Context&... context) {
+  read_value(value, target.emplace(), context...);
+}
+template <typename T, typename... Context>
+void read_value(const YamlValue& value, std::vector<T>& target, const Context&... context) {
+  target.clear();
+  for (const YamlValue& item : value.read_list())
+    read_value(item, target.emplace_back(), context...);
+}
+template <typename T, typename... Context>
+void read_value(const YamlValue& value, T& target, const Context&... context) {
+  YamlMap map = value.read_mapping();
+  if constexpr (sizeof...(Context) == 1 && (std::invocable<Context, YamlMap&, T&> && ...)) {
+    (context(map, target), ...);
+  } else {
+    describe(map, target, context...);
+  }
+  map.check_all_keys_read();
 }
 
 /// Parses the text of a YAML file, which may be other than a mapping, by yaml-cpp. Throws
@@ -154,7 +245,17 @@ YamlMap read_yaml_file(const std::filesystem::path& file);
 /// formats, too.
 YamlMap read_yaml_file(const std::filesystem::path& file, const std::string& format);
 /// Checks that the key `format` of a mapping has this value. Throws InputError otherwise.
-void check_yaml_file_format(YamlMap& map, const std::string& format);
+void check_yaml_format(YamlMap& map, const std::string& format);
+/// Reads a file of a described type. Throws InputError as read_yaml_file() and read_value().
+template <typename T, typename... Context>
+T read_yaml_document(const std::filesystem::path& file, const std::string& format,
+                     const Context&... context) {
+  YamlMap map = read_yaml_file(file, format);
+  T document{};
+  describe(map, document, context...);
+  map.check_all_keys_read();
+  return document;
+}
 
 }  // namespace vlp
 #pragma GCC visibility pop

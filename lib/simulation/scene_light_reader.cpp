@@ -4,195 +4,19 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
-#include "geometry/angles.h"
 #include "rig/yaml_parts.h"
 #include "simulation/scene_parts.h"
 
 namespace vlp {
 namespace {
 
-double read_fraction(YamlMap& map, const std::string& key) {
-  return map.get_required_yaml_value(key).read_yaml_number_within(0, 1,
-                                                                  "(of the source's radiance)");
-}
-
-DarkSide read_dark_side(YamlMap& map) {
-  return {read_fraction(map, "reflector_ratio"),
-          rad_from_deg(map.get_required_yaml_value("azimuth_deg")
-                           .read_yaml_number_within(-360, 360, "degrees"))};
-}
-
-Recess read_recess(YamlMap& map, const Glow& rim) {
-  Recess recess;
-  recess.depth_m = map.get_required_yaml_value("depth_m").read_yaml_number_within(0, 2, "m");
-  const YamlValue source = map.get_required_yaml_value("source_diameter_m");
-  recess.source_diameter_m = source.read_yaml_number_within(1e-3, 10, "m");
-  if (recess.source_diameter_m > 2 * rim.glow_radius_m()) {
-    throw source.make_yaml_error("is larger than the rim, diameter_m");
-  }
-  recess.reflector_ratio = read_fraction(map, "reflector_ratio");
-  recess.dark_side = map.convert_optional_yaml_mapping("dark_side", read_dark_side);
-  recess.source_power =
-      map.get_optional_yaml_number("source_power", 0.5, 30, "").value_or(recess.source_power);
-  recess.rim_power =
-      map.get_optional_yaml_number("rim_power", 0, 30, "").value_or(recess.rim_power);
-  recess.beam_power =
-      map.get_optional_yaml_number("beam_power", 0, 30, "").value_or(recess.beam_power);
-  recess.far_side_slope = map.get_optional_yaml_number("far_side_slope", 0.01, 100,
-                                                       "(meters sideways for each meter up)");
-  return recess;
-}
-
-Chips read_chips(YamlMap& map, const Glow& disc) {
-  Chips chips;
-  chips.fraction = read_fraction(map, "fraction");
-  const YamlValue pitch = map.get_required_yaml_value("pitch_m");
-  chips.pitch_m = pitch.read_yaml_number_within(1e-3, 10, "m");
-  if (chips.pitch_m > 2 * disc.glow_radius_m())
-    throw pitch.make_yaml_error("is larger than the disc, diameter_m");
-  const YamlValue width = map.get_required_yaml_value("width_m");
-  chips.width_m = width.read_yaml_number_within(1e-4, 10, "m");
-  if (chips.width_m > 2 * chips.pitch_m) {
-    throw width.make_yaml_error("is more than twice pitch_m: such chips are an even disc");
-  }
-  return chips;
-}
-
-RandomChips read_random_chips(YamlMap& map) {
-  RandomChips chips;
-  chips.count = map.get_required_yaml_value("count").read_yaml_integer_within(1, 1000);
-  chips.sigma_fraction = map.get_required_yaml_value("sigma_fraction")
-                             .read_yaml_number_within(0.01, 1, "(of the disc's radius)");
-  chips.within_fraction = map.get_required_yaml_value("within_fraction")
-                              .read_yaml_number_within(0, 1, "(of the disc's radius)");
-  std::tie(chips.min_excess, chips.max_excess) =
-      read_yaml_range(map.get_required_yaml_value("excess"), 0, 10, "(of the disc's radiance)");
-  return chips;
-}
-
-Halo read_halo(YamlMap& map) {
-  return {read_fraction(map, "fraction"),
-          map.get_required_yaml_value("length_m").read_yaml_number_within(1e-3, 2, "m")};
-}
-
-/// Reads the keys of a glow except those of read_radial_profile().
-Glow read_glow(YamlMap& map, const Room& room) {
-  const YamlValue position = map.get_required_yaml_value("position_m");
-  Glow glow{read_yaml_point(position), read_lamp_shape_from_yaml(map), 0, 1};
-  if (!glow.shape.size_m) map.get_required_yaml_value("diameter_m");
-  glow.electron_rate_e_per_s = read_yaml_electron_rate(map, "electron_rate_e_per_s");
-  const Eigen::Array3d at = glow.position_m.array();
-  if ((at < room.min_m.array()).any() || (at > room.max_m.array()).any()) {
-    throw position.make_yaml_error("is outside the room");
-  }
-  return glow;
-}
-
-/// Reads the brightness profile of a disc: recess or rim_to_center_ratio, and halo. Other shapes
-/// are evenly bright.
-void read_radial_profile(YamlMap& map, Glow& glow) {
-  if (glow.shape.kind != ShapeKind::disc) return;
-  glow.recess = map.convert_optional_yaml_mapping(
-      "recess", [&](YamlMap& keys) { return read_recess(keys, glow); });
-  if (!glow.recess) {
-    glow.rim_to_center_ratio =
-        map.get_required_yaml_value("rim_to_center_ratio")
-            .read_yaml_number_within(0, 2, "(of the radiance at the center)");
-    glow.chips = map.convert_optional_yaml_mapping(
-        "chips", [&](YamlMap& keys) { return read_chips(keys, glow); });
-    if (const auto chips = map.get_optional_yaml_value("random_chips")) {
-      if (glow.chips)
-        throw chips->make_yaml_error("excludes chips: a disc has one of them; leave one out");
-      glow.random_chips = chips->convert_yaml_mapping(read_random_chips);
-    }
-  }
-  glow.halo = map.convert_optional_yaml_mapping("halo", read_halo);
-}
-
-Glow read_steady_lamp(YamlMap& map, const Room& room) {
-  Glow glow = read_glow(map, room);
-  read_radial_profile(map, glow);
-  return glow;
-}
-
-Reflection read_reflection(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room) {
-  const YamlValue id = map.get_required_yaml_value("of_lamp");
-  const int wanted = id.read_yaml_integer_within(0, std::numeric_limits<int>::max());
-  const auto lamp = std::ranges::find(lamps, wanted, &SceneLamp::id);
-  if (lamp == lamps.end()) throw id.make_yaml_error("there is no lamp " + std::to_string(wanted));
-  Reflection reflection{read_glow(map, room), std::size_t(lamp - lamps.begin())};
-  reflection.glow.rim_to_center_ratio = 0;
-  return reflection;
-}
-
-/// Reads a panel's corner and edges.
-Panel read_panel_edges(YamlMap& map) {
-  Panel panel{};
-  panel.corner_m = read_yaml_point(map.get_required_yaml_value("corner_m"));
-  const YamlValue edges = map.get_required_yaml_value("edges_m");
-  const auto list = edges.read_yaml_list();
-  if (list.size() != 2)
-    throw edges.make_yaml_error("should be two vectors, from the corner along each edge");
-  panel.edge_a_m = read_yaml_point(list[0]);
-  panel.edge_b_m = read_yaml_point(list[1]);
-  const double lengths = panel.edge_a_m.norm() * panel.edge_b_m.norm();
-  constexpr double right_angle = 1e-6;
-  if (!(lengths > 0) || std::abs(panel.edge_a_m.dot(panel.edge_b_m)) > right_angle * lengths) {
-    throw edges.make_yaml_error("should be at right angles to each other and not of length zero");
-  }
-  return panel;
-}
-
-Panel read_panel(YamlMap& map) {
-  Panel panel = read_panel_edges(map);
-  panel.electron_rate_e_per_s = read_yaml_electron_rate(map, "electron_rate_e_per_s");
-  return panel;
-}
-
-RectifiedSine read_mains(YamlMap& map) {
-  return {map.get_required_yaml_value("frequency_hz").read_yaml_number_within(10, 1000, "Hz"),
-          map.get_required_yaml_value("depth").read_yaml_number_within(0, 1, "(of the light)"), 0};
-}
-
-SquareWave read_pwm(YamlMap& map) {
-  return {map.get_required_yaml_value("frequency_hz").read_yaml_number_within(1, 1e6, "Hz"),
-          map.get_required_yaml_value("duty").read_yaml_number_within(1e-3, 1, "(of a period)"), 0};
-}
-
-ForeignLight read_foreign_light(YamlMap& map, const Room& room) {
-  ForeignLight light{read_steady_lamp(map, room), {}, {}};
-  const auto pwm = map.get_optional_yaml_value("pwm"), mains = map.get_optional_yaml_value("mains");
-  if (pwm.has_value() == mains.has_value())
-    throw map.make_yaml_error("needs one of the keys pwm and mains");
-  if (pwm) {
-    light.wave = pwm->convert_yaml_mapping(read_pwm);
-  } else {
-    light.wave = mains->convert_yaml_mapping(read_mains);
-  }
-  light.phase = map.get_optional_yaml_number("phase", 0, 1, "(of a period)");
-  return light;
-}
-
-Mirror read_mirror(YamlMap& map) {
-  return {
-      read_panel_edges(map),
-      map.get_required_yaml_value("reflectance").read_yaml_number_within(0, 1, "(of the light)")};
-}
-
-Blind read_venetian_blind(YamlMap& map) {
-  return {read_panel(map), map.get_required_yaml_value("slats").read_yaml_integer_within(1, 1000),
-          map.get_required_yaml_value("open_fraction")
-              .read_yaml_number_within(0, 1, "(of a slat's pitch)")};
-}
-
-Sign read_sign(YamlMap& map) {
-  return {read_panel(map),
-          map.get_required_yaml_value("lines").read_yaml_integer_within(1, 100),
-          map.get_required_yaml_value("letters").read_yaml_integer_within(1, 100),
-          {}};
-}
+constexpr Range kRadianceFraction{0, 1, "(of the source's radiance)"};
+constexpr Range kPhase{0, 1, "(of a period)"};
 
 /// Returns the height of the lowest light, m. Mirror images do not count.
 double find_lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& clutter) {
@@ -214,65 +38,185 @@ double find_lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& c
   return lowest_m;
 }
 
-/// Rejects an occluder that is not below every light, since it is rendered as hiding all lights.
-void check_occluder(const YamlValue& item, const Panel& occluder, double lowest_light_m) {
-  const double highest_m = occluder.corner_m.z() + std::max(0.0, occluder.edge_a_m.z()) +
-                           std::max(0.0, occluder.edge_b_m.z());
-  if (highest_m < lowest_light_m) return;
-  throw item.make_yaml_error("is not below every lamp and other light");
-}
-
-SceneLamp read_scene_lamp(YamlMap& map, const Lamp& lamp, const Room& room) {
-  SceneLamp read{lamp.id,
-                 read_glow(map, room),
-                 map.get_required_yaml_value("frequency_hz").read_yaml_number(),
-                 map.get_required_yaml_value("duty").read_yaml_number(),
-                 {},
-                 Eigen::Vector3d::Zero()};
-  read_radial_profile(map, read.glow);
-  read.phase = map.get_optional_yaml_number("phase", 0, 1, "(of a period)");
-  if (const auto error = map.get_optional_yaml_value("map_error_m"))
-    read.map_error_m = read_yaml_point(*error);
-  return read;
+/// Returns the height of the highest point of a panel, m.
+double find_highest_point_m(const Panel& panel) {
+  return panel.corner_m.z() + std::max(0.0, panel.edge_a_m.z()) + std::max(0.0, panel.edge_b_m.z());
 }
 
 }  // namespace
 
-std::vector<SceneLamp> read_scene_lamps(const YamlValue& list, const Room& room) {
-  std::vector<SceneLamp> lamps;
-  UniqueLamps earlier;
-  for (const YamlValue& item : list.read_yaml_list()) {
-    lamps.push_back(item.convert_yaml_mapping([&](YamlMap& map) {
-      const Lamp lamp = read_lamp_from_yaml(map);
-      earlier.check_lamp_id_and_position_unique(lamp, item);
-      earlier.register_lamp_id_and_position(lamp);
-      return read_scene_lamp(map, lamp, room);
-    }));
-  }
-  return lamps;
+static void describe(YamlMap& io, DarkSide& side) {
+  io.required("reflector_ratio", side.reflector_ratio, kRadianceFraction);
+  io.required("azimuth_deg", side.azimuth_rad, kAzimuth);
 }
 
-Clutter read_scene_clutter(YamlMap& map, const std::vector<SceneLamp>& lamps, const Room& room) {
-  Clutter clutter;
-  clutter.steady_lamps = map.convert_yaml_mapping_list_or_empty(
-      "steady_lamps", [&](YamlMap& keys) { return read_steady_lamp(keys, room); });
-  clutter.windows = map.convert_yaml_mapping_list_or_empty("windows", read_panel);
-  clutter.reflections = map.convert_yaml_mapping_list_or_empty(
-      "reflections", [&](YamlMap& keys) { return read_reflection(keys, lamps, room); });
-  clutter.foreign_lights = map.convert_yaml_mapping_list_or_empty(
-      "foreign_lights", [&](YamlMap& keys) { return read_foreign_light(keys, room); });
-  clutter.mirrors = map.convert_yaml_mapping_list_or_empty("mirrors", read_mirror);
-  clutter.blinds = map.convert_yaml_mapping_list_or_empty("blinds", read_venetian_blind);
-  clutter.signs = map.convert_yaml_mapping_list_or_empty("signs", read_sign);
-  clutter.ambient_flicker = map.convert_optional_yaml_mapping("ambient_flicker", read_mains);
-  const double lowest_m = find_lowest_light_m(lamps, clutter);
-  if (const auto occluders = map.get_optional_yaml_value("occluders")) {
-    for (const YamlValue& item : occluders->read_yaml_list()) {
-      clutter.occluders.push_back(item.convert_yaml_mapping(read_panel));
-      check_occluder(item, clutter.occluders.back(), lowest_m);
-    }
+static void describe(YamlMap& io, Recess& recess, const Glow& rim) {
+  constexpr Range exponent{0, 30};
+  io.required("depth_m", recess.depth_m, Range{0, 2, "m"});
+  io.required("source_diameter_m", recess.source_diameter_m, Range{1e-3, 10, "m"})
+      .check(recess.source_diameter_m <= 2 * rim.glow_radius_m(),
+             "is larger than the rim, diameter_m");
+  io.required("reflector_ratio", recess.reflector_ratio, kRadianceFraction);
+  io.optional("dark_side", recess.dark_side);
+  io.optional("source_power", recess.source_power, Range{0.5, 30});
+  io.optional("rim_power", recess.rim_power, exponent);
+  io.optional("beam_power", recess.beam_power, exponent);
+  io.optional("far_side_slope", recess.far_side_slope,
+              Range{0.01, 100, "(meters sideways for each meter up)"});
+}
+
+static void describe(YamlMap& io, Chips& chips, const Glow& disc) {
+  io.required("fraction", chips.fraction, kRadianceFraction);
+  io.required("pitch_m", chips.pitch_m, Range{1e-3, 10, "m"})
+      .check(chips.pitch_m <= 2 * disc.glow_radius_m(), "is larger than the disc, diameter_m");
+  io.required("width_m", chips.width_m, Range{1e-4, 10, "m"})
+      .check(chips.width_m <= 2 * chips.pitch_m,
+             "is more than twice pitch_m: such chips are an even disc");
+}
+
+static void describe(YamlMap& io, RandomChips& chips) {
+  constexpr Range radius_fraction{0, 1, "(of the disc's radius)"};
+  constexpr Range radiance_fraction{0, 10, "(of the disc's radiance)"};
+  std::pair<double, double> excess;
+  io.required("count", chips.count, Range{1, 1000});
+  io.required("sigma_fraction", chips.sigma_fraction, Range{0.01, 1, "(of the disc's radius)"});
+  io.required("within_fraction", chips.within_fraction, radius_fraction);
+  io.required("excess", excess, radiance_fraction)
+      .check(excess.first <= excess.second, "should be [least, most]");
+  std::tie(chips.min_excess, chips.max_excess) = excess;
+}
+
+static void describe(YamlMap& io, Halo& halo) {
+  io.required("fraction", halo.fraction, kRadianceFraction);
+  io.required("length_m", halo.length_m, Range{1e-3, 2, "m"});
+}
+
+/// Describes a glow without its brightness profile.
+static void describe_glow(YamlMap& io, Glow& glow, const Room& room) {
+  const YamlField position = io.required("position_m", glow.position_m, kPosition);
+  glow.shape = read_lamp_shape_from_yaml(io);
+  if (!glow.shape.size_m) io.require("diameter_m");
+  io.required("electron_rate_e_per_s", glow.electron_rate_e_per_s, kElectronRate);
+  glow.rim_to_center_ratio = 1;
+  const Eigen::Array3d at = glow.position_m.array();
+  position.check((at >= room.min_m.array()).all() && (at <= room.max_m.array()).all(),
+                 "is outside the room");
+}
+
+/// Describes a glow. A disc has a recess or a rim_to_center_ratio, and a halo; other shapes are
+/// evenly bright.
+static void describe(YamlMap& io, Glow& glow, const Room& room) {
+  describe_glow(io, glow, room);
+  if (glow.shape.kind != ShapeKind::disc) return;
+  if (!io.optional("recess", glow.recess, glow)) {
+    io.required("rim_to_center_ratio", glow.rim_to_center_ratio,
+                Range{0, 2, "(of the radiance at the center)"});
+    io.optional("chips", glow.chips, glow);
+    io.optional("random_chips", glow.random_chips)
+        .check(!glow.chips, "excludes chips: a disc has one of them; leave one out");
   }
-  return clutter;
+  io.optional("halo", glow.halo);
+}
+
+static void describe(YamlMap& io, Reflection& reflection, const std::vector<SceneLamp>& lamps,
+                     const Room& room) {
+  int id = 0;
+  const YamlField of_lamp = io.required("of_lamp", id);
+  const auto lamp = std::ranges::find(lamps, id, &SceneLamp::id);
+  of_lamp.check(lamp != lamps.end(), "there is no lamp " + std::to_string(id));
+  reflection.lamp = std::size_t(lamp - lamps.begin());
+  describe_glow(io, reflection.glow, room);
+  reflection.glow.rim_to_center_ratio = 0;
+}
+
+/// Describes a panel's corner and edges.
+static void describe_edges(YamlMap& io, Panel& panel) {
+  io.required("corner_m", panel.corner_m, kPosition);
+  std::vector<Eigen::Vector3d> vectors;
+  const YamlField edges = io.required("edges_m", vectors, kPosition);
+  edges.check(vectors.size() == 2, "should be two vectors, from the corner along each edge");
+  panel.edge_a_m = vectors[0];
+  panel.edge_b_m = vectors[1];
+  const double lengths = panel.edge_a_m.norm() * panel.edge_b_m.norm();
+  constexpr double right_angle = 1e-6;
+  edges.check(lengths > 0 && std::abs(panel.edge_a_m.dot(panel.edge_b_m)) <= right_angle * lengths,
+              "should be at right angles to each other and not of length zero");
+}
+
+static void describe(YamlMap& io, Panel& panel) {
+  describe_edges(io, panel);
+  io.required("electron_rate_e_per_s", panel.electron_rate_e_per_s, kElectronRate);
+}
+
+static void describe(YamlMap& io, RectifiedSine& mains) {
+  io.required("frequency_hz", mains.frequency_hz, Range{10, 1000, "Hz"});
+  io.required("depth", mains.depth, Range{0, 1, "(of the light)"});
+}
+
+static void describe(YamlMap& io, SquareWave& pwm) {
+  io.required("frequency_hz", pwm.frequency_hz, Range{1, 1e6, "Hz"});
+  io.required("duty", pwm.duty, Range{1e-3, 1, "(of a period)"});
+}
+
+static void describe(YamlMap& io, ForeignLight& light, const Room& room) {
+  describe(io, light.glow, room);
+  SquareWave pwm{};
+  RectifiedSine mains{};
+  const bool has_pwm(io.optional("pwm", pwm)), has_mains(io.optional("mains", mains));
+  io.check(has_pwm != has_mains, "needs one of the keys pwm and mains");
+  light.wave = has_pwm ? LightWave(pwm) : LightWave(mains);
+  io.optional("phase", light.phase, kPhase);
+}
+
+static void describe(YamlMap& io, Mirror& mirror) {
+  describe_edges(io, mirror.pane);
+  io.required("reflectance", mirror.reflectance, Range{0, 1, "(of the light)"});
+}
+
+static void describe(YamlMap& io, Blind& blind) {
+  describe(io, blind.window);
+  io.required("slats", blind.slats, Range{1, 1000});
+  io.required("open_fraction", blind.open_fraction, Range{0, 1, "(of a slat's pitch)"});
+}
+
+static void describe(YamlMap& io, Sign& sign) {
+  describe(io, sign.panel);
+  io.required("lines", sign.lines, Range{1, 100});
+  io.required("letters", sign.letters, Range{1, 100});
+}
+
+void describe_scene_lamps(YamlMap& io, std::vector<SceneLamp>& lamps, const Room& room) {
+  UniqueLamps earlier;
+  io.optional("lamps", lamps, [&](YamlMap& map, SceneLamp& scene_lamp) {
+    const Lamp lamp = read_lamp_from_yaml(map);
+    earlier.check_unique(lamp, map);
+    earlier.add(lamp);
+    scene_lamp.id = lamp.id;
+    describe(map, scene_lamp.glow, room);
+    map.required("frequency_hz", scene_lamp.frequency_hz);
+    map.required("duty", scene_lamp.duty);
+    map.optional("phase", scene_lamp.phase, kPhase);
+    scene_lamp.map_error_m.setZero();
+    map.optional("map_error_m", scene_lamp.map_error_m, kPosition);
+  });
+}
+
+void describe(YamlMap& io, Clutter& clutter, const std::vector<SceneLamp>& lamps,
+              const Room& room) {
+  io.optional("steady_lamps", clutter.steady_lamps, room);
+  io.optional("windows", clutter.windows);
+  io.optional("reflections", clutter.reflections, lamps, room);
+  io.optional("foreign_lights", clutter.foreign_lights, room);
+  io.optional("mirrors", clutter.mirrors);
+  io.optional("blinds", clutter.blinds);
+  io.optional("signs", clutter.signs);
+  io.optional("ambient_flicker", clutter.ambient_flicker);
+  // An occluder is rendered as hiding all lights.
+  const double lowest_m = find_lowest_light_m(lamps, clutter);
+  io.optional("occluders", clutter.occluders, [&](YamlMap& map, Panel& occluder) {
+    describe(map, occluder);
+    map.check(find_highest_point_m(occluder) < lowest_m, "is not below every lamp and other light");
+  });
 }
 
 }  // namespace vlp

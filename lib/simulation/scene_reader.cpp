@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <set>
 #include <stdexcept>
 
@@ -15,235 +14,167 @@
 #include "simulation/scene_parts.h"
 
 namespace vlp {
-namespace {
 
-constexpr double kLargest = 1e12;
-constexpr double kMaxDefocus_px = 20;
-constexpr double kMaxSpot_px = 1e4;
+static constexpr Range kLightFraction{0, 1, "(of the light)"};
+static constexpr Range kDefocus{-20, 20, "px"}, kRadius{0, 20, "px"}, kSigma{0.3, 50, "px"};
+static constexpr Range kSpotPosition{-1e4, 1e4, "px"}, kSpotRadius{1, 1e4, "px"};
 
-Room read_room(YamlMap& map) {
-  Room room;
-  for (const auto& [key, axis] : {std::pair("x_m", 0), std::pair("y_m", 1), std::pair("z_m", 2)}) {
-    const YamlValue value = map.get_required_yaml_value(key);
-    const auto range = value.read_yaml_numbers(2);
-    if (!(range[0] < range[1])) throw value.make_yaml_error("should be [least, most]");
-    value.read_yaml_numbers_within(2, -200, 200, "m");
-    room.min_m[axis] = range[0];
-    room.max_m[axis] = range[1];
+static void describe(YamlMap& io, Room& room) {
+  constexpr const char* keys[] = {"x_m", "y_m", "z_m"};
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::Vector2d range_m;
+    io.required(keys[axis], range_m, kPosition)
+        .check(range_m[0] < range_m[1], "should be [least, most]");
+    room.min_m[axis] = range_m[0];
+    room.max_m[axis] = range_m[1];
   }
-  return room;
 }
 
-Camera read_scene_camera(YamlMap& map) {
-  Camera camera = read_camera_from_yaml(map);
-  for (const std::string key : {"row_time_s", "readout"}) map.get_required_yaml_value(key);
-  for (int focal : {0, 1}) {
-    map.get_required_yaml_value("intrinsics")
-        .read_yaml_list()[std::size_t(focal)]
-        .read_yaml_number_within(1, 1e6, "px");
-  }
-  const YamlValue imager = map.get_required_yaml_value("imager_px");
-  for (const YamlValue& side : imager.read_yaml_list()) side.read_yaml_integer_within(8, 20000);
+static void describe_scene_camera(YamlMap& io, Camera& camera) {
+  camera = read_camera_from_yaml(io);
+  for (const char* key : {"row_time_s", "readout"}) io.require(key);
+  const YamlField intrinsics(io.require("intrinsics"));
+  for (const std::size_t focal : {0U, 1U}) intrinsics.item(focal).check_within({1, 1e6, "px"});
+  std::vector<int> imager_px;
   constexpr double max_px = 64e6;
-  if (double(camera.imager_px[0]) * camera.imager_px[1] > max_px) {
-    throw imager.make_yaml_error("has more than 64 million pixels");
-  }
-  return camera;
+  io.required("imager_px", imager_px, Range{8, 20000})
+      .check(double(camera.imager_px[0]) * camera.imager_px[1] <= max_px,
+             "has more than 64 million pixels");
 }
 
-Defocus read_defocus(YamlMap& map) {
-  Defocus defocus{
-      map.get_required_yaml_value("radius_px").read_yaml_number_within(0, kMaxDefocus_px, "px")};
-  if (const auto tilt = map.get_optional_yaml_value("tilt_px")) {
-    defocus.tilt_px = Eigen::Vector2d(
-        tilt->read_yaml_numbers_within(2, -kMaxDefocus_px, kMaxDefocus_px, "px").data());
-  }
-  return defocus;
+static void describe(YamlMap& io, Defocus& defocus) {
+  io.required("radius_px", defocus.radius_px, kRadius);
+  io.optional("tilt_px", defocus.tilt_px, kDefocus);
 }
 
-Eigen::Vector2d read_pivot(YamlMap& map) {
-  return Eigen::Vector2d(map.get_required_yaml_value("at_px")
-                             .read_yaml_numbers_within(2, -kMaxSpot_px, kMaxSpot_px, "px")
-                             .data());
+static void describe(YamlMap& io, LensSmear& smear) {
+  io.required("at_px", smear.at_px, kSpotPosition);
+  io.required("radius_px", smear.radius_px, kSpotRadius);
+  io.required("fraction", smear.fraction, kLightFraction);
+  io.required("sigma_px", smear.sigma_px, kSigma);
 }
 
-LensSmear read_smear(YamlMap& map) {
-  return {read_pivot(map),
-          map.get_required_yaml_value("radius_px").read_yaml_number_within(1, kMaxSpot_px, "px"),
-          map.get_required_yaml_value("fraction").read_yaml_number_within(0, 1, "(of the light)"),
-          map.get_required_yaml_value("sigma_px").read_yaml_number_within(0.3, 50, "px")};
+static void describe(YamlMap& io, Dust& dust) {
+  io.required("at_px", dust.at_px, kSpotPosition);
+  io.required("radius_px", dust.radius_px, kSpotRadius);
+  io.required("depth", dust.depth, kLightFraction);
 }
 
-Dust read_dust(YamlMap& map) {
-  return {read_pivot(map),
-          map.get_required_yaml_value("radius_px").read_yaml_number_within(1, kMaxSpot_px, "px"),
-          map.get_required_yaml_value("depth").read_yaml_number_within(0, 1, "(of the light)")};
+static void describe(YamlMap& io, Optics& optics) {
+  io.required("blur_px", optics.blur_px, kRadius);
+  io.required("vignetting_power", optics.vignetting_power, Range{0, 20});
+  io.optional("defocus", optics.defocus);
+  io.optional("veil", optics.veiling_glare, kLightFraction);
+  io.optional("smears", optics.smears);
+  io.optional("dust", optics.dust);
 }
 
-Optics read_optics(YamlMap& map) {
-  return {map.get_required_yaml_value("blur_px").read_yaml_number_within(0, 20, "px"),
-          map.get_required_yaml_value("vignetting_power").read_yaml_number_within(0, 20, ""),
-          map.convert_optional_yaml_mapping("defocus", read_defocus),
-          map.get_optional_yaml_number("veil", 0, 1, "(of the light)").value_or(0),
-          map.convert_yaml_mapping_list_or_empty("smears", read_smear),
-          map.convert_yaml_mapping_list_or_empty("dust", read_dust)};
+static void describe(YamlMap& io, Bloom& bloom) {
+  io.required("fraction", bloom.fraction, Range{0, 1, "(of the charge)"});
+  io.required("sigma_px", bloom.sigma_px, kSigma);
 }
 
-Bloom read_bloom(YamlMap& map) {
-  return {map.get_required_yaml_value("fraction").read_yaml_number_within(0, 1, "(of the charge)"),
-          map.get_required_yaml_value("sigma_px").read_yaml_number_within(0.3, 50, "px")};
+static void describe(YamlMap& io, Sensor& sensor) {
+  io.required("bits", sensor.bits, Range{8, 16})
+      .check(sensor.bits == 8 || sensor.bits == 16, "should be 8 or 16");
+  io.required("gain_dn_per_e", sensor.gain_dn_per_e, Range{1e-6, 1e4, "DN per electron"});
+  io.required("black_level_dn", sensor.black_level_dn,
+              Range{0, sensor_white_level_dn(sensor), "DN"});
+  io.required("full_well_e", sensor.full_well_e, Range{1, 1e9, "electrons"});
+  io.required("read_noise_e", sensor.read_noise_e, Range{0, 1e6, "electrons"});
+  io.required("shot_noise", sensor.shot_noise);
+  io.optional("bloom", sensor.bloom);
 }
 
-Sensor read_sensor(YamlMap& map) {
-  Sensor sensor;
-  const YamlValue bits = map.get_required_yaml_value("bits");
-  sensor.bits = bits.read_yaml_integer_within(8, 16);
-  if (sensor.bits != 8 && sensor.bits != 16) throw bits.make_yaml_error("should be 8 or 16");
-  sensor.gain_dn_per_e = map.get_required_yaml_value("gain_dn_per_e")
-                             .read_yaml_number_within(1e-6, 1e4, "DN per electron");
-  sensor.black_level_dn = map.get_required_yaml_value("black_level_dn")
-                              .read_yaml_number_within(0, sensor_white_level_dn(sensor), "DN");
-  sensor.full_well_e =
-      map.get_required_yaml_value("full_well_e").read_yaml_number_within(1, 1e9, "electrons");
-  sensor.read_noise_e =
-      map.get_required_yaml_value("read_noise_e").read_yaml_number_within(0, 1e6, "electrons");
-  sensor.shot_noise = map.get_required_yaml_value("shot_noise").read_yaml_boolean();
-  sensor.bloom = map.convert_optional_yaml_mapping("bloom", read_bloom);
-  return sensor;
+static void describe(YamlMap& io, Sharpening& sharpening) {
+  io.required("amount", sharpening.amount, Range{0, 10, "(of the detail)"});
+  io.required("radius_px", sharpening.radius_px, kSigma);
 }
 
-Sharpening read_sharpening(YamlMap& map) {
-  return {map.get_required_yaml_value("amount").read_yaml_number_within(0, 10, "(of the detail)"),
-          map.get_required_yaml_value("radius_px").read_yaml_number_within(0.3, 50, "px")};
+static void describe(YamlMap& io, Bayer& bayer) {
+  constexpr Range ratio{0.05, 2, "(of what green filters pass)"};
+  io.required("red_to_green_ratio", bayer.red_to_green_ratio, ratio);
+  io.required("blue_to_green_ratio", bayer.blue_to_green_ratio, ratio);
 }
 
-Bayer read_bayer(YamlMap& map) {
-  const std::string unit = "(of what green filters pass)";
-  return {
-      map.get_required_yaml_value("red_to_green_ratio").read_yaml_number_within(0.05, 2, unit),
-      map.get_required_yaml_value("blue_to_green_ratio").read_yaml_number_within(0.05, 2, unit)};
+static void describe(YamlMap& io, ImageProcessing& processing, const Sensor& sensor) {
+  io.check(sensor.black_level_dn < sensor_white_level_dn(sensor),
+           "needs levels between sensor.black_level_dn and white");
+  io.required("gamma", processing.gamma, Range{0.1, 10, "(of the tone curve)"});
+  io.optional("sharpening", processing.sharpening);
+  io.optional("jpeg_quality", processing.jpeg_quality, Range{1, 100})
+      .check(sensor.bits == 8, "JPEG has 8 bits: set sensor.bits to 8");
+  io.optional("bayer", processing.bayer);
 }
 
-ImageProcessing read_image_processing(YamlMap& map, const Sensor& sensor) {
-  if (sensor.black_level_dn >= sensor_white_level_dn(sensor)) {
-    throw map.make_yaml_error("needs levels between sensor.black_level_dn and white");
-  }
-  ImageProcessing picture;
-  picture.gamma =
-      map.get_required_yaml_value("gamma").read_yaml_number_within(0.1, 10, "(of the tone curve)");
-  picture.sharpening = map.convert_optional_yaml_mapping("sharpening", read_sharpening);
-  if (const auto quality = map.get_optional_yaml_value("jpeg_quality")) {
-    picture.jpeg_quality = quality->read_yaml_integer_within(1, 100);
-    if (sensor.bits != 8) throw quality->make_yaml_error("JPEG has 8 bits: set sensor.bits to 8");
-  }
-  picture.bayer = map.convert_optional_yaml_mapping("bayer", read_bayer);
-  return picture;
+static void describe(YamlMap& io, Mount& mount) {
+  double tilt_rad = 0, azimuth_rad = 0;
+  io.required("tilt_deg", tilt_rad, DegreeRange{0, 45});
+  io.required("tilt_azimuth_deg", azimuth_rad, kAzimuth);
+  io.required("lever_arm_m", mount.lever_arm_m, Range{-5, 5, "m"});
+  mount.level_from_camera =
+      level_rotation_from_zenith({std::sin(tilt_rad) * std::cos(azimuth_rad),
+                                  std::sin(tilt_rad) * std::sin(azimuth_rad), std::cos(tilt_rad)});
 }
 
-Mount read_mount(YamlMap& map) {
-  const double tilt = rad_from_deg(
-      map.get_required_yaml_value("tilt_deg").read_yaml_number_within(0, 45, "degrees"));
-  const double azimuth = rad_from_deg(map.get_required_yaml_value("tilt_azimuth_deg")
-                                          .read_yaml_number_within(-360, 360, "degrees"));
-  const Eigen::Vector3d zenith_in_camera(std::sin(tilt) * std::cos(azimuth),
-                                         std::sin(tilt) * std::sin(azimuth), std::cos(tilt));
-  return {level_rotation_from_zenith(zenith_in_camera),
-          Eigen::Vector2d(map.get_required_yaml_value("lever_arm_m")
-                              .read_yaml_numbers_within(2, -5, 5, "m")
-                              .data())};
-}
-
-SceneBoard read_scene_board(YamlMap& map) {
-  SceneBoard board;
-  const YamlValue print = map.get_required_yaml_value("pattern");
-  board.pattern =
-      print.convert_yaml_mapping([](YamlMap& keys) { return read_board_from_yaml(keys); });
-  board.margin_m = map.get_required_yaml_value("margin_m").read_yaml_number_within(0, 2, "m");
+static void describe(YamlMap& io, SceneBoard& board) {
+  const YamlField pattern = io.required("pattern", board.pattern, [](YamlMap& keys, Board& target) {
+    target = read_board_from_yaml(keys);
+  });
+  io.required("margin_m", board.margin_m, Range{0, 2, "m"});
   constexpr double micrometers = 1e6;  // unit of the bound in messages
   const double tenth_m =
       0.1 * compute_tag_pitch_m(board.pattern) * std::min(board.pattern.cols, board.pattern.rows);
   const double max_warp_m = std::round(micrometers * tenth_m) / micrometers;
-  board.warp_m = Eigen::Vector2d(map.get_required_yaml_value("warp_m")
-                                     .read_yaml_numbers_within(2, -max_warp_m, max_warp_m, "m")
-                                     .data());
-  board.white_e_per_s = read_yaml_electron_rate(map, "white_e_per_s");
-  board.black_e_per_s = read_yaml_electron_rate(map, "black_e_per_s");
-  board.surround_e_per_s = read_yaml_electron_rate(map, "surround_e_per_s");
+  io.required("warp_m", board.warp_m, Range{-max_warp_m, max_warp_m, "m"});
+  io.required("white_e_per_s", board.white_e_per_s, kElectronRate);
+  io.required("black_e_per_s", board.black_e_per_s, kElectronRate);
+  io.required("surround_e_per_s", board.surround_e_per_s, kElectronRate);
   try {
     BoardPattern{board};
   } catch (const std::invalid_argument& failure) {
-    throw print.make_yaml_error(failure.what());
+    pattern.check(false, failure.what());
   }
-  return board;
 }
 
-ArchiveVariation read_archive_variation(YamlMap& map) {
-  const auto fraction = [&](const char* key, double max_fraction) {
-    return map.get_required_yaml_value(key).read_yaml_number_within(0, max_fraction, "");
+static void describe(YamlMap& io, ArchiveVariation& archive) {
+  io.required("sessions_per_camera", archive.sessions_per_camera, Range{1, 10'000});
+  io.required("focal_fraction", archive.focal_fraction, Range{0, 0.5});
+  io.required("principal_point_px", archive.principal_point_px, Range{0, 1e4, "px"});
+  io.required("distortion_fraction", archive.distortion_fraction, Range{0, 0.5});
+  io.required("tilt_deg", archive.tilt_rad, DegreeRange{0, 20});
+  io.required("lever_arm_m", archive.lever_arm_m, Range{0, 1, "m"});
+  io.required("map_error_m", archive.map_error_m, Range{0, 1, "m"});
+  io.required("fault_fraction", archive.fault_fraction, Range{0, 1});
+  io.required("damage_fraction", archive.damage_fraction, Range{0, 1});
+}
+
+static void describe(YamlMap& io, Scene& scene) {
+  int seed = 0;
+  io.required("seed", seed);
+  scene.seed = static_cast<std::uint64_t>(seed);
+  Room room;
+  io.required("room", room);
+  io.required("camera", scene.camera, describe_scene_camera);
+  io.required("optics", scene.optics);
+  io.required("sensor", scene.sensor);
+  io.optional("processing", scene.processing, scene.sensor);
+  io.required("mount", scene.mount);
+  io.required("ambient_e_per_s", scene.ambient_e_per_s, kElectronRate);
+  describe_scene_lamps(io, scene.lamps, room);
+  io.optional("clutter", scene.clutter, scene.lamps, room);
+  io.optional("board", scene.board);
+  io.optional("archive", scene.archive);
+  std::set<std::string> folders;
+  const auto read_set = [&](YamlMap& map, CaptureSet& set) {
+    describe(map, set, scene, room);
+    map.check(folders.insert(set.folder).second, "folder '" + set.folder + "' occurs twice");
   };
-  return {map.get_required_yaml_value("sessions_per_camera").read_yaml_integer_within(1, 10'000),
-          fraction("focal_fraction", 0.5),
-          map.get_required_yaml_value("principal_point_px").read_yaml_number_within(0, 1e4, "px"),
-          fraction("distortion_fraction", 0.5),
-          rad_from_deg(
-              map.get_required_yaml_value("tilt_deg").read_yaml_number_within(0, 20, "degrees")),
-          map.get_required_yaml_value("lever_arm_m").read_yaml_number_within(0, 1, "m"),
-          map.get_required_yaml_value("map_error_m").read_yaml_number_within(0, 1, "m"),
-          fraction("fault_fraction", 1),
-          fraction("damage_fraction", 1)};
-}
-
-}  // namespace
-
-Eigen::Vector3d read_yaml_point(const YamlValue& value) {
-  return Eigen::Vector3d(value.read_yaml_numbers_within(3, -200, 200, "m").data());
-}
-
-double read_yaml_electron_rate(YamlMap& map, const std::string& key) {
-  return map.get_required_yaml_value(key).read_yaml_number_within(0, kLargest,
-                                                                  "electrons per second");
-}
-
-std::pair<double, double> read_yaml_range(const YamlValue& value, double min, double max,
-                                          std::string_view unit) {
-  const auto range = value.read_yaml_numbers_within(2, min, max, unit);
-  if (range[0] > range[1]) throw value.make_yaml_error("should be [least, most]");
-  return {range[0], range[1]};
+  io.required("captures", scene.sets, read_set).check(!scene.sets.empty(), "contains no captures");
 }
 
 Scene read_scene_file(const std::filesystem::path& file) {
-  YamlMap document = read_yaml_file(file, "vlp-scene/1");
-  Scene scene;
-  scene.seed =
-      static_cast<std::uint64_t>(document.get_required_yaml_value("seed").read_yaml_integer_within(
-          0, std::numeric_limits<int>::max()));
-  const Room room = document.get_required_yaml_value("room").convert_yaml_mapping(read_room);
-  scene.camera = document.get_required_yaml_value("camera").convert_yaml_mapping(read_scene_camera);
-  scene.optics = document.get_required_yaml_value("optics").convert_yaml_mapping(read_optics);
-  scene.sensor = document.get_required_yaml_value("sensor").convert_yaml_mapping(read_sensor);
-  scene.processing = document.convert_optional_yaml_mapping(
-      "processing", [&](YamlMap& map) { return read_image_processing(map, scene.sensor); });
-  scene.mount = document.get_required_yaml_value("mount").convert_yaml_mapping(read_mount);
-  scene.ambient_e_per_s = read_yaml_electron_rate(document, "ambient_e_per_s");
-  if (const auto lamps = document.get_optional_yaml_value("lamps"))
-    scene.lamps = read_scene_lamps(*lamps, room);
-  if (const auto clutter = document.get_optional_yaml_value("clutter")) {
-    scene.clutter = clutter->convert_yaml_mapping(
-        [&](YamlMap& map) { return read_scene_clutter(map, scene.lamps, room); });
-  }
-  scene.board = document.convert_optional_yaml_mapping("board", read_scene_board);
-  scene.archive = document.convert_optional_yaml_mapping("archive", read_archive_variation);
-  const YamlValue captures = document.get_required_yaml_value("captures");
-  document.check_all_yaml_keys_read();
-  std::set<std::string> folders;
-  for (const YamlValue& item : captures.read_yaml_list()) {
-    scene.sets.push_back(item.convert_yaml_mapping(
-        [&](YamlMap& map) { return read_scene_capture_set(map, scene, room); }));
-    if (!folders.insert(scene.sets.back().folder).second) {
-      throw item.make_yaml_error("folder '" + scene.sets.back().folder + "' occurs twice");
-    }
-  }
-  if (scene.sets.empty()) throw captures.make_yaml_error("contains no captures");
+  auto scene = read_yaml_document<Scene>(file, "vlp-scene/1");
   draw_random_scene_parts(scene);
   return scene;
 }

@@ -24,19 +24,17 @@ constexpr int kMany = 10'000;
 
 /// Returns the path in a value.
 fs::path resolve_path(const YamlValue& value, const fs::path& file) {
-  const fs::path path = value.read_yaml_string();
-  if (path.empty()) throw value.make_yaml_error("names nothing");
+  const fs::path path = value.read_text();
+  if (path.empty()) throw value.make_error("names nothing");
   return path.is_absolute() ? path : file.parent_path() / path;
 }
 
 void read_optional_into(YamlMap& map, const char* key, int& target) {
-  if (const auto value = map.get_optional_yaml_value(key))
-    target = value->read_yaml_integer_within(1, kMany);
+  if (const auto value = map.find(key)) target = value->read_integer({1, kMany});
 }
 void read_optional_into(YamlMap& map, const char* key, double& target, double max,
                         const char* unit) {
-  if (const auto value = map.get_optional_yaml_value(key))
-    target = value->read_yaml_number_within(0, max, unit);
+  if (const auto value = map.find(key)) target = value->read_number({0, max, unit});
 }
 
 CompletionCriteria read_completion_criteria(YamlMap map) {
@@ -50,7 +48,7 @@ CompletionCriteria read_completion_criteria(YamlMap map) {
   sufficient.rotation_arc_rad = rad_from_deg(arc_deg);
   read_optional_into(map, "dispersion_captures", sufficient.dispersion_captures);
   read_optional_into(map, "check_captures", sufficient.check_captures);
-  map.check_all_yaml_keys_read();
+  map.check_all_keys_read();
   return sufficient;
 }
 
@@ -61,7 +59,7 @@ void read_rejection_limits(YamlMap map, StationConfig& config) {
   read_optional_into(map, "white_fraction", limits.max_white_fraction, 1, "(share)");
   read_optional_into(map, "same_pose_fraction", limits.same_view_fraction, 1, "(share)");
   read_optional_into(map, "max_consecutive_rejections", config.max_consecutive_rejections);
-  map.check_all_yaml_keys_read();
+  map.check_all_keys_read();
 }
 
 /// Reads the files that a station names, and stores their digests.
@@ -92,7 +90,7 @@ class Files {
 Calibration read_row_time_and_readout(const YamlValue& value, Files& files) {
   Calibration calibration = read_calibration(files(value));
   if (!calibration.camera.row_time_s || !calibration.camera.readout) {
-    throw value.make_yaml_error(
+    throw value.make_error(
         "its camera should have row_time_s and readout, which are needed to identify lamps");
   }
   return calibration;
@@ -101,57 +99,54 @@ Calibration read_row_time_and_readout(const YamlValue& value, Files& files) {
 /// Adds guard bands to gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
 void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
   constexpr double max_k = 10, max_u = 1e6;
-  const YamlValue factor = map.get_required_yaml_value("k");
-  const double k = factor.read_yaml_number_within(0, max_k, "(factor)");
-  const YamlValue stated = map.get_required_yaml_value("standard_uncertainties");
-  YamlMap uncertainties = stated.read_yaml_mapping();
+  const YamlValue factor = map.require("k");
+  const double k = factor.read_number({0, max_k, "(factor)"});
+  const YamlValue stated = map.require("standard_uncertainties");
+  YamlMap uncertainties = stated.read_mapping();
   int found = 0;
   for (Gate& gate : gates) {
-    const auto value = uncertainties.get_optional_yaml_value(gate.metric.c_str());
+    const auto value = uncertainties.find(gate.metric.c_str());
     if (!value) continue;
     ++found;
-    const double u = value->read_yaml_number_within(0, max_u, "(in the gate's unit)");
-    if (!(u > 0)) throw value->make_yaml_error("should be above 0");
+    const double u = value->read_number({0, max_u, "(in the gate's unit)"});
+    if (!(u > 0)) throw value->make_error("should be above 0");
     gate.guard_band = GuardBand{u, k};
     const MetricKind kind = find_metric_kind(gate.metric).value();
     const double accepted =
         CheckedMetric{gate.metric, "", {}, gate.limit, kind.direction, gate.guard_band}
             .acceptance_limit();
     if (accepted >= 0 && accepted <= kind.max_limit) continue;
-    throw value->make_yaml_error(
+    throw value->make_error(
         "leaves no value within the gate: k times this uncertainty exceeds the limit; lower k");
   }
-  uncertainties.check_all_yaml_keys_read();  // uncertainties of metrics without a gate
-  if (found == 0) throw stated.make_yaml_error("names no gate");
-  map.check_all_yaml_keys_read();
+  uncertainties.check_all_keys_read();  // uncertainties of metrics without a gate
+  if (found == 0) throw stated.make_error("names no gate");
+  map.check_all_keys_read();
 }
 
 GoldenUnit read_golden(YamlMap map, Files& files) {
-  const YamlValue camera = map.get_required_yaml_value("camera_id");
-  if (!Id::is_valid_name_of_camera_or_run(camera.read_yaml_string()))
-    throw camera.make_yaml_error("is no id of a camera: it names a folder");
-  GoldenUnit golden{camera.read_yaml_string(), {}, {}};
-  const YamlValue calibration = map.get_required_yaml_value("calibration");
+  const YamlValue camera = map.require("camera_id");
+  if (!Id::is_valid_name_of_camera_or_run(camera.read_text()))
+    throw camera.make_error("is no id of a camera: it names a folder");
+  GoldenUnit golden{camera.read_text(), {}, {}};
+  const YamlValue calibration = map.require("calibration");
   golden.calibration = read_row_time_and_readout(calibration, files);
   if (!golden.calibration.rotation_center) {
-    throw calibration.make_yaml_error(
-        "should be a complete calibration: it has no rotation_center");
+    throw calibration.make_error("should be a complete calibration: it has no rotation_center");
   }
-  golden.gates = read_gates(map.get_required_yaml_value("gates"), list_unit_metric_kinds());
-  map.check_all_yaml_keys_read();
+  golden.gates = read_gates(map.require("gates"), list_unit_metric_kinds());
+  map.check_all_keys_read();
   return golden;
 }
 
 VerificationInterval read_verification_interval(YamlMap map) {
   VerificationInterval due;
   constexpr double max_h = 10'000;
-  if (const auto hours = map.get_optional_yaml_value("hours"))
-    due.hours = hours->read_yaml_number_within(0, max_h, "h");
-  if (const auto units = map.get_optional_yaml_value("units"))
-    due.units = units->read_yaml_integer_within(1, 1'000'000);
-  if (!due.hours && !due.units) throw map.make_yaml_error("should have hours or units");
-  if (due.hours == 0) throw map.make_yaml_error("hours should be above 0");
-  map.check_all_yaml_keys_read();
+  if (const auto hours = map.find("hours")) due.hours = hours->read_number({0, max_h, "h"});
+  if (const auto units = map.find("units")) due.units = units->read_integer({1, 1'000'000});
+  if (!due.hours && !due.units) throw map.make_error("should have hours or units");
+  if (due.hours == 0) throw map.make_error("hours should be above 0");
+  map.check_all_keys_read();
   return due;
 }
 
@@ -159,12 +154,11 @@ Retention read_retention(YamlMap map) {
   Retention keep;
   constexpr int max_days = 36'525;
   const auto days = [&](const char* key, std::optional<int>& metric) {
-    if (const auto value = map.get_optional_yaml_value(key))
-      metric = value->read_yaml_integer_within(1, max_days);
+    if (const auto value = map.find(key)) metric = value->read_integer({1, max_days});
   };
   days("images_days", keep.images_days);
   days("results_days", keep.results_days);
-  map.check_all_yaml_keys_read();
+  map.check_all_keys_read();
   return keep;
 }
 
@@ -223,11 +217,11 @@ std::string describe_serial_pattern_mismatch(const std::string& serial,
 }
 
 std::string read_pattern(const YamlValue& value) {
-  std::string pattern = value.read_yaml_string();
+  std::string pattern = value.read_text();
   try {
     const std::regex compiled(pattern);
   } catch (const std::regex_error& error) {
-    throw value.make_yaml_error(std::string("is no regular expression: ") + error.what());
+    throw value.make_error(std::string("is no regular expression: ") + error.what());
   }
   return pattern;
 }
@@ -236,96 +230,94 @@ std::string read_pattern(const YamlValue& value) {
 /// others are found by PATH.
 Hook read_hook(YamlMap map, const fs::path& file) {
   Hook hook;
-  const YamlValue command = map.get_required_yaml_value("command");
-  for (const YamlValue& word : command.read_yaml_list())
-    hook.command.push_back(word.read_yaml_string());
+  const YamlValue command = map.require("command");
+  for (const YamlValue& word : command.read_list()) hook.command.push_back(word.read_text());
   if (hook.command.empty() || hook.command.front().empty()) {
-    throw command.make_yaml_error("should be a program and its arguments: [PROGRAM, ...]");
+    throw command.make_error("should be a program and its arguments: [PROGRAM, ...]");
   }
   hook.folder = fs::absolute(file).parent_path();
   std::string& program = hook.command.front();
   if (program.find('/') != std::string::npos) program = (hook.folder / program).string();
   constexpr double max_s = 3600;
-  if (const auto limit = map.get_optional_yaml_value("time_limit_s")) {
-    hook.time_limit_s = limit->read_yaml_number_within(0, max_s, "seconds");
-    if (!(hook.time_limit_s > 0)) throw limit->make_yaml_error("should be above 0");
+  if (const auto limit = map.find("time_limit_s")) {
+    hook.time_limit_s = limit->read_number({0, max_s, "seconds"});
+    if (!(hook.time_limit_s > 0)) throw limit->make_error("should be above 0");
   }
-  map.check_all_yaml_keys_read();
+  map.check_all_keys_read();
   return hook;
 }
 
 /// Returns a database: a file relative to the station, or a server.
 std::string read_records_address(const YamlValue& value, const fs::path& file) {
-  const std::string where = value.read_yaml_string();
+  const std::string where = value.read_text();
   if (where.starts_with("postgresql://") || where.starts_with("postgres://")) return where;
   if (is_database_server_address(where))
-    throw value.make_yaml_error("should name a file, or be postgresql://...");
+    throw value.make_error("should name a file, or be postgresql://...");
   describe_database(where);  // checks the name of a file
   return resolve_path(value, file).string();
 }
 
 /// Reads the camera type and the targets that it observes: board, lamps and known position.
 void read_camera_and_targets(YamlMap& document, Files& files, StationConfig& config) {
-  const YamlValue type = document.get_required_yaml_value("camera_type");
+  const YamlValue type = document.require("camera_type");
   config.nominal_camera = read_row_time_and_readout(type, files).camera;
-  config.type_file = fs::path(type.read_yaml_string()).filename().string();
-  const YamlValue board = document.get_required_yaml_value("board");
+  config.type_file = fs::path(type.read_text()).filename().string();
+  const YamlValue board = document.require("board");
   config.board = read_board(files(board));
   if (config.board.has_chessboard_squares()) {
-    throw board.make_yaml_error("is a board of squares: the station looks for one of AprilTags");
+    throw board.make_error("is a board of squares: the station looks for one of AprilTags");
   }
-  const auto room = document.get_optional_yaml_value("room");
-  config.lamps = read_overhead_lamps_of_room(files(document.get_required_yaml_value("lamps")),
-                                             room ? room->read_yaml_string() : std::string());
-  if (const auto place = document.get_optional_yaml_value("dispersion_position_m")) {
-    config.dispersion_position_m = Eigen::Vector2d(place->read_yaml_numbers(2).data());
+  const auto room = document.find("room");
+  config.lamps = read_overhead_lamps_of_room(files(document.require("lamps")),
+                                             room ? room->read_text() : std::string());
+  if (const auto place = document.find("dispersion_position_m")) {
+    config.dispersion_position_m = Eigen::Vector2d(place->read_numbers(2).data());
   }
 }
 
 /// Reads the conditions of a verdict: completion, rejection of images, gates and golden unit.
 void read_verdict_conditions(YamlMap& document, Files& files, StationConfig& config) {
-  if (const auto sufficient = document.get_optional_yaml_value("completion"))
-    config.completion = read_completion_criteria(sufficient->read_yaml_mapping());
-  if (const auto refuse = document.get_optional_yaml_value("rejection"))
-    read_rejection_limits(refuse->read_yaml_mapping(), config);
-  config.gates = read_gates(document.get_required_yaml_value("gates"), list_unit_metric_kinds());
-  if (const auto guard = document.get_optional_yaml_value("guard_bands")) {
-    read_guard_bands(guard->read_yaml_mapping(), config.gates);
+  if (const auto sufficient = document.find("completion"))
+    config.completion = read_completion_criteria(sufficient->read_mapping());
+  if (const auto refuse = document.find("rejection"))
+    read_rejection_limits(refuse->read_mapping(), config);
+  config.gates = read_gates(document.require("gates"), list_unit_metric_kinds());
+  if (const auto guard = document.find("guard_bands")) {
+    read_guard_bands(guard->read_mapping(), config.gates);
   }
-  if (const auto golden = document.get_optional_yaml_value("golden")) {
-    config.golden_unit = read_golden(golden->read_yaml_mapping(), files);
+  if (const auto golden = document.find("golden")) {
+    config.golden_unit = read_golden(golden->read_mapping(), files);
   }
-  if (const auto due = document.get_optional_yaml_value("verify_due")) {
-    if (!config.golden_unit)
-      throw due->make_yaml_error("needs a golden unit: add the key 'golden'");
-    config.verification_interval = read_verification_interval(due->read_yaml_mapping());
+  if (const auto due = document.find("verify_due")) {
+    if (!config.golden_unit) throw due->make_error("needs a golden unit: add the key 'golden'");
+    config.verification_interval = read_verification_interval(due->read_mapping());
   }
 }
 
 /// Reads the valid serials, and the operators who may void runs.
 void read_serials_and_operators(YamlMap& document, StationConfig& config) {
-  if (const auto pattern = document.get_optional_yaml_value("serial_pattern")) {
+  if (const auto pattern = document.find("serial_pattern")) {
     config.serial_pattern = read_pattern(*pattern);
   }
-  if (const auto operators = document.get_optional_yaml_value("void_operators")) {
-    const std::vector<YamlValue> names = operators->read_yaml_list();
+  if (const auto operators = document.find("void_operators")) {
+    const std::vector<YamlValue> names = operators->read_list();
     if (names.empty())
-      throw operators->make_yaml_error("names nobody; leave it out if all may void runs");
+      throw operators->make_error("names nobody; leave it out if all may void runs");
     std::ranges::transform(names, std::back_inserter(config.void_operators),
-                           [](const YamlValue& name) { return name.read_yaml_string(); });
+                           [](const YamlValue& name) { return name.read_text(); });
   }
 }
 
 /// Reads the folders of images and results, and where and how long runs are kept.
 void read_storage(YamlMap& document, StationConfig& config) {
   const fs::path& file = config.file;
-  config.captures = resolve_path(document.get_required_yaml_value("captures"), file);
-  config.results = resolve_path(document.get_required_yaml_value("results"), file);
-  config.records = read_records_address(document.get_required_yaml_value("records"), file);
-  const auto spool = document.get_optional_yaml_value("spool");
+  config.captures = resolve_path(document.require("captures"), file);
+  config.results = resolve_path(document.require("results"), file);
+  config.records = read_records_address(document.require("records"), file);
+  const auto spool = document.find("spool");
   config.spool = spool ? resolve_path(*spool, file) : file.parent_path() / "spool";
-  if (const auto keep = document.get_optional_yaml_value("retention"))
-    config.retention = read_retention(keep->read_yaml_mapping());
+  if (const auto keep = document.find("retention"))
+    config.retention = read_retention(keep->read_mapping());
 }
 
 }  // namespace
@@ -351,14 +343,13 @@ StationConfig read_station_config(const fs::path& file) {
   Files files(file);
   StationConfig config;
   config.file = file;
-  config.station = document.get_required_yaml_value("station").read_yaml_string();
+  config.station = document.require("station").read_text();
   read_camera_and_targets(document, files, config);
   read_verdict_conditions(document, files, config);
   read_serials_and_operators(document, config);
   read_storage(document, config);
-  if (const auto hook = document.get_optional_yaml_value("hook"))
-    config.hook = read_hook(hook->read_yaml_mapping(), file);
-  document.check_all_yaml_keys_read();
+  if (const auto hook = document.find("hook")) config.hook = read_hook(hook->read_mapping(), file);
+  document.check_all_keys_read();
   const auto& lamps = config.lamps.lamps;
   if (std::none_of(lamps.begin(), lamps.end(), [](const Lamp& l) { return l.frequency_hz; })) {
     throw InputError(

@@ -174,31 +174,31 @@ namespace {
 constexpr const char* kFormat = "vlp-classifier/1";
 
 LampFeatures read_features(const YamlValue& value) {
-  return LampFeatures(value.read_yaml_numbers(kLampFeatures.size()).data());
+  return LampFeatures(value.read_numbers(kLampFeatures.size()).data());
 }
 
 void check_features(const YamlValue& value) {
-  const auto names = value.read_yaml_list();
+  const auto names = value.read_list();
   std::string known;
   for (const std::string_view name : kLampFeatures) {
     known.append(known.empty() ? "" : ", ").append(name);
   }
   bool same = names.size() == kLampFeatures.size();
   for (std::size_t i = 0; same && i < names.size(); ++i)
-    same = names[i].read_yaml_string() == kLampFeatures[i];
-  if (!same) throw value.make_yaml_error("should be [" + known + "]: train the classifier again");
+    same = names[i].read_text() == kLampFeatures[i];
+  if (!same) throw value.make_error("should be [" + known + "]: train the classifier again");
 }
 
 Eigen::Matrix4d read_covariance(const YamlValue& value) {
-  const auto rows = value.read_yaml_list();
+  const auto rows = value.read_list();
   if (rows.size() != kLampFeatures.size())
-    throw value.make_yaml_error("should be four rows of four numbers");
+    throw value.make_error("should be four rows of four numbers");
   Eigen::Matrix4d covariance;
   for (int row = 0; row < 4; ++row) {
     covariance.row(row) = read_features(rows[static_cast<std::size_t>(row)]).transpose();
   }
   if (covariance != covariance.transpose() || !invert_positive_definite_matrix(covariance)) {
-    throw value.make_yaml_error("is not a covariance: it should be symmetric and positive");
+    throw value.make_error("is not a covariance: it should be symmetric and positive");
   }
   return covariance;
 }
@@ -206,10 +206,10 @@ Eigen::Matrix4d read_covariance(const YamlValue& value) {
 LampClassifier::Class read_class(YamlMap map) {
   constexpr int largest = std::numeric_limits<int>::max();
   LampClassifier::Class lamp;
-  lamp.lamp = map.get_required_yaml_value("id").read_yaml_integer_within(0, largest);
-  lamp.examples = map.get_required_yaml_value("examples").read_yaml_integer_within(1, largest);
-  lamp.center = read_features(map.get_required_yaml_value("center"));
-  map.check_all_yaml_keys_read();
+  lamp.lamp = map.require("id").read_integer({0, largest});
+  lamp.examples = map.require("examples").read_integer({1, largest});
+  lamp.center = read_features(map.require("center"));
+  map.check_all_keys_read();
   return lamp;
 }
 
@@ -218,27 +218,27 @@ LampClassifier::Class read_class(YamlMap map) {
 LampClassifier read_lamp_classifier(const std::filesystem::path& file) {
   YamlMap document = read_yaml_file(file, kFormat);
   LampClassifier classifier;
-  if (const auto value = document.get_optional_yaml_value("row_time_s")) {
-    classifier.row_time_s = value->read_yaml_number_within(1e-8, 1e-3, "s");
+  if (const auto value = document.find("row_time_s")) {
+    classifier.row_time_s = value->read_number({1e-8, 1e-3, "s"});
   }
-  check_features(document.get_required_yaml_value("features"));
-  classifier.mean = read_features(document.get_required_yaml_value("mean"));
-  const YamlValue scale = document.get_required_yaml_value("scale");
+  check_features(document.require("features"));
+  classifier.mean = read_features(document.require("mean"));
+  const YamlValue scale = document.require("scale");
   classifier.scale = read_features(scale);
-  if (!(classifier.scale.minCoeff() > 0)) throw scale.make_yaml_error("should be positive");
-  const auto lamps = document.get_required_yaml_value("lamps");
-  classifier.covariance = read_covariance(document.get_required_yaml_value("covariance"));
-  document.check_all_yaml_keys_read();
-  for (const YamlValue& item : lamps.read_yaml_list()) {
-    const auto lamp = read_class(item.read_yaml_mapping());
+  if (!(classifier.scale.minCoeff() > 0)) throw scale.make_error("should be positive");
+  const auto lamps = document.require("lamps");
+  classifier.covariance = read_covariance(document.require("covariance"));
+  document.check_all_keys_read();
+  for (const YamlValue& item : lamps.read_list()) {
+    const auto lamp = read_class(item.read_mapping());
     for (const auto& other : classifier.lamps) {
       if (other.lamp == lamp.lamp) {
-        throw item.make_yaml_error("id " + std::to_string(lamp.lamp) + " occurs twice");
+        throw item.make_error("id " + std::to_string(lamp.lamp) + " occurs twice");
       }
     }
     classifier.lamps.push_back(lamp);
   }
-  if (classifier.lamps.empty()) throw lamps.make_yaml_error("contains no lamp");
+  if (classifier.lamps.empty()) throw lamps.make_error("contains no lamp");
   return classifier;
 }
 
