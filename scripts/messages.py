@@ -83,7 +83,6 @@ CLEAR = [
     "'@' is %40",
     "a quote ",
     "alarms, the last",
-    "along rows or columns",
     "and {} more",
     "another run is at work",
     "are missing",

@@ -2,10 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rig/lamp_shape.h"
 
-#include <algorithm>
+#include <array>
 #include <cassert>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "rig/yaml_parts.h"
@@ -14,15 +15,17 @@
 namespace vlp {
 namespace {
 
-constexpr double kMinSize_m = 1e-3, kMaxSize_m = 10;
-constexpr double kMaxYaw_rad = 6.3;  // a full turn; larger values indicate degrees
+constexpr Range kLampSize{1e-3, 10, "m"};
+constexpr Range kLampYaw{-6.3, 6.3, "rad"};  // a full turn; larger values indicate degrees
 
-/// Lists the names of all shapes, or of those with two sizes.
-std::string list_names(bool only_two_sizes) {
+constexpr std::array kShapeNames{kShapeTraits[0].name, kShapeTraits[1].name};
+static_assert(kShapeNames.size() == kShapeTraits.size());
+constexpr Words kShapeWords{kShapeNames, ""};
+
+std::string list_shapes_with_two_sizes() {
   std::string names;
   for (const ShapeTraits& traits : kShapeTraits) {
-    if (only_two_sizes && !traits.has_two_sizes) continue;
-    names.append(names.empty() ? "" : ", ").append(traits.name);
+    if (traits.has_two_sizes) names.append(names.empty() ? "" : ", ").append(traits.name);
   }
   return names;
 }
@@ -51,46 +54,40 @@ std::vector<Eigen::Vector3d> compute_lamp_outline_points(const LampShape& shape,
   return points_m;
 }
 
-LampShape read_lamp_shape_from_yaml(YamlMap& map) {
-  LampShape shape;
-  const auto word = map.find("shape");
-  if (word) {
-    const std::string name = word->read_text();
-    const auto* traits = std::ranges::find(kShapeTraits, name, &ShapeTraits::name);
-    if (traits == kShapeTraits.end()) throw word->make_unknown_word_error(list_names(false));
-    shape.kind = traits->kind;
-  }
+template <typename Io>
+void describe(Io& io, Described<Io, LampShape> shape) {
+  io.optional("shape", shape.kind, kShapeWords);
   const ShapeTraits& traits = get_lamp_shape_traits(shape.kind);
-  const auto diameter = map.find("diameter_m");
-  const auto size = map.find("size_m"), yaw = map.find("yaw_rad");
-  if (!traits.has_two_sizes) {
-    if (size || yaw) {
-      const std::string names = list_names(true);
-      throw(size ? size : yaw)
-          ->make_error("is of a " + names + ": say 'shape: " + names + "', too");
+  std::optional<double> diameter_m, yaw_rad;
+  std::optional<Eigen::Vector2d> size_m;
+  if constexpr (!Io::is_reader) {
+    assert(shape.size_m || !traits.has_two_sizes);
+    if (traits.has_two_sizes) {
+      size_m = shape.size_m;
+      yaw_rad = shape.yaw_rad;
+    } else if (shape.size_m) {
+      diameter_m = shape.size_m->x();
     }
-    return diameter ? make_disc_lamp_shape(diameter->read_number({kMinSize_m, kMaxSize_m, "m"}))
-                    : shape;
   }
-  if (diameter) {
-    throw diameter->make_error("is of a disc, and this is a " + std::string(traits.name) +
-                               ": it has a size_m");
+  const auto diameter = io.optional("diameter_m", diameter_m, kLampSize);
+  const auto size = io.optional("size_m", size_m, kLampSize),
+             yaw = io.optional("yaw_rad", yaw_rad, kLampYaw);
+  if constexpr (Io::is_reader) {
+    if (traits.has_two_sizes) {
+      diameter.check(
+          false, "is of a disc, and this is a " + std::string(traits.name) + ": it has a size_m");
+      if (!size) io.require("size_m");
+      shape.size_m = size_m;
+      shape.yaw_rad = yaw_rad.value_or(0);
+    } else {
+      const std::string names = list_shapes_with_two_sizes();
+      (size ? size : yaw).check(false, "is of a " + names + ": say 'shape: " + names + "', too");
+      if (diameter_m) shape = make_disc_lamp_shape(*diameter_m);
+    }
   }
-  const YamlValue sides = map.require("size_m");
-  shape.size_m = Eigen::Vector2d(sides.read_numbers(2).data());
-  if (yaw) shape.yaw_rad = yaw->read_number({-kMaxYaw_rad, kMaxYaw_rad, "rad"});
-  for (const YamlValue& side : sides.read_list()) side.read_number({kMinSize_m, kMaxSize_m, "m"});
-  return shape;
 }
 
-void emit_yaml_lamp_shape(YAML::Emitter& out, const LampShape& shape) {
-  assert(shape.size_m || !get_lamp_shape_traits(shape.kind).has_two_sizes);
-  if (!shape.size_m) return;
-  const ShapeTraits& traits = get_lamp_shape_traits(shape.kind);
-  if (!traits.has_two_sizes) return emit_yaml_number(out, "diameter_m", shape.size_m->x());
-  emit_yaml_plain_word(out, "shape", traits.name);
-  emit_yaml_numbers(out, "size_m", *shape.size_m);
-  emit_yaml_number(out, "yaw_rad", shape.yaw_rad);
-}
+template void describe<YamlMap>(YamlMap& io, LampShape& shape);
+template void describe<YamlWriter>(YamlWriter& io, const LampShape& shape);
 
 }  // namespace vlp

@@ -14,19 +14,16 @@
 #pragma GCC visibility push(hidden)
 namespace vlp {
 
-/// Readers of the parts that several kinds of documents contain. Each reads the keys of `map` that
-/// are the fields of its result. The caller reads its own keys and calls
-/// check_all_keys_read(). All throw InputError if a value is invalid.
-Lamp read_lamp_from_yaml(YamlMap& map);
-/// Reads the shape of a lamp (kind, axis lengths in m, yaw in rad) from the keys of a lamp. The
-/// size is std::nullopt for a disc without diameter_m.
-/// @throws InputError if a value is invalid
-LampShape read_lamp_shape_from_yaml(YamlMap& map);
-Board read_board_from_yaml(YamlMap& map);
-Camera read_camera_from_yaml(YamlMap& map);
-
-/// Writes the keys of a shape to the current YAML map, as read by read_lamp_shape_from_yaml().
-void emit_yaml_lamp_shape(YAML::Emitter& out, const LampShape& shape);
+/// Descriptions of the parts that several kinds of documents contain. A disc without diameter_m
+/// has no size.
+template <typename Io>
+void describe(Io& io, Described<Io, Lamp> lamp);
+template <typename Io>
+void describe(Io& io, Described<Io, LampShape> shape);
+template <typename Io>
+void describe(Io& io, Described<Io, Board> board);
+template <typename Io>
+void describe(Io& io, Described<Io, Camera> camera);
 
 /// Index of the lamps that were already read from a file, to find duplicates by id and position.
 class UniqueLamps {

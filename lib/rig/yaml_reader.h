@@ -59,10 +59,6 @@ class YamlValue {
   std::vector<double> read_numbers(std::size_t count) const;
   std::vector<YamlValue> read_list() const;
   YamlMap read_mapping() const;
-  template <typename Read>
-  auto convert_mapping(const Read& read) const;
-  template <typename Read>
-  auto convert_mapping_list(const Read& read) const;
 
   InputError make_error(const std::string& problem) const;
   /// Returns the error for a word that is not among the valid ones, `known`.
@@ -120,11 +116,18 @@ class YamlMap {
     if (value) read_value(*value, target, limits...);
     return {std::move(value)};
   }
+  /// optional() of a key that is always written.
+  template <typename T, typename... Limits>
+  YamlField with_default(const std::string& key, T&& target, const Limits&... limits) {
+    return optional(key, target, limits...);
+  }
   /// required() of a key that a writer writes after the others, so that a truncated file lacks it.
   template <typename T>
   YamlField required_last(const std::string& key, T& target) {
     return required(key, target);
   }
+  /// Throws InputError with `problem` if the mapping has a key that is no longer valid.
+  void refuse(const std::string& key, std::string_view problem) const { check(!has(key), problem); }
   /// Checks that all keys of the mapping were read. Throws InputError for the first one that was
   /// not.
   void check_all_keys_read() const;
@@ -149,21 +152,6 @@ class YamlMap {
   std::vector<std::string> known_;
 };
 
-template <typename Read>
-auto YamlValue::convert_mapping(const Read& read) const {
-  YamlMap keys = read_mapping();
-  auto result = read(keys);
-  keys.check_all_keys_read();
-  return result;
-}
-
-template <typename Read>
-auto YamlValue::convert_mapping_list(const Read& read) const {
-  std::vector<decltype(convert_mapping(read))> results;
-  for (const YamlValue& item : read_list()) results.push_back(item.convert_mapping(read));
-  return results;
-}
-
 /// Read a value into `target`; the items of a list, with the same limits. A mapping is read by
 /// describe(). A function of `target` and of a YamlValue, or of a YamlMap&, may be given in place
 /// of limits.
@@ -186,8 +174,11 @@ inline void read_value(const YamlValue& value, std::string& target, PlainText) {
 inline void read_value(const YamlValue& value, std::string& target, const Words& words) {
   target = words.names[value.read_word(words)];
 }
+inline void read_value(const YamlValue& value, std::vector<double>& target, std::size_t count) {
+  target = value.read_numbers(count);
+}
 template <typename Enumeration>
-requires std::is_enum_v<Enumeration>
+requires std::is_enum_v<Enumeration> || std::is_same_v<Enumeration, bool>
 void read_value(const YamlValue& value, Enumeration& target, const Words& words) {
   target = static_cast<Enumeration>(value.read_word(words));
 }

@@ -94,7 +94,7 @@ static void describe(YamlMap& io, Halo& halo) {
 /// Describes a glow without its brightness profile.
 static void describe_glow(YamlMap& io, Glow& glow, const Room& room) {
   const YamlField position = io.required("position_m", glow.position_m, kPosition);
-  glow.shape = read_lamp_shape_from_yaml(io);
+  describe(io, glow.shape);
   if (!glow.shape.size_m) io.require("diameter_m");
   io.required("electron_rate_e_per_s", glow.electron_rate_e_per_s, kElectronRate);
   glow.rim_to_center_ratio = 1;
@@ -188,7 +188,8 @@ static void describe(YamlMap& io, Sign& sign) {
 void describe_scene_lamps(YamlMap& io, std::vector<SceneLamp>& lamps, const Room& room) {
   UniqueLamps earlier;
   io.optional("lamps", lamps, [&](YamlMap& map, SceneLamp& scene_lamp) {
-    const Lamp lamp = read_lamp_from_yaml(map);
+    Lamp lamp{};
+    describe(map, lamp);
     earlier.check_unique(lamp, map);
     earlier.add(lamp);
     scene_lamp.id = lamp.id;

@@ -31,7 +31,7 @@ static void describe(YamlMap& io, Room& room) {
 }
 
 static void describe_scene_camera(YamlMap& io, Camera& camera) {
-  camera = read_camera_from_yaml(io);
+  describe(io, camera);
   for (const char* key : {"row_time_s", "readout"}) io.require(key);
   const YamlField intrinsics(io.require("intrinsics"));
   for (const std::size_t focal : {0U, 1U}) intrinsics.item(focal).check_within({1, 1e6, "px"});
@@ -118,9 +118,7 @@ static void describe(YamlMap& io, Mount& mount) {
 }
 
 static void describe(YamlMap& io, SceneBoard& board) {
-  const YamlField pattern = io.required("pattern", board.pattern, [](YamlMap& keys, Board& target) {
-    target = read_board_from_yaml(keys);
-  });
+  const YamlField pattern = io.required("pattern", board.pattern);
   io.required("margin_m", board.margin_m, Range{0, 2, "m"});
   constexpr double micrometers = 1e6;  // unit of the bound in messages
   const double tenth_m =

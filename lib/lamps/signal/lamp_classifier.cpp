@@ -173,102 +173,62 @@ namespace {
 
 constexpr const char* kFormat = "vlp-classifier/1";
 
-LampFeatures read_features(const YamlValue& value) {
-  return LampFeatures(value.read_numbers(kLampFeatures.size()).data());
-}
-
-void check_features(const YamlValue& value) {
-  const auto names = value.read_list();
-  std::string known;
-  for (const std::string_view name : kLampFeatures) {
-    known.append(known.empty() ? "" : ", ").append(name);
-  }
-  bool same = names.size() == kLampFeatures.size();
-  for (std::size_t i = 0; same && i < names.size(); ++i)
-    same = names[i].read_text() == kLampFeatures[i];
-  if (!same) throw value.make_error("should be [" + known + "]: train the classifier again");
-}
-
-Eigen::Matrix4d read_covariance(const YamlValue& value) {
-  const auto rows = value.read_list();
-  if (rows.size() != kLampFeatures.size())
-    throw value.make_error("should be four rows of four numbers");
-  Eigen::Matrix4d covariance;
-  for (int row = 0; row < 4; ++row) {
-    covariance.row(row) = read_features(rows[static_cast<std::size_t>(row)]).transpose();
-  }
-  if (covariance != covariance.transpose() || !invert_positive_definite_matrix(covariance)) {
-    throw value.make_error("is not a covariance: it should be symmetric and positive");
-  }
-  return covariance;
-}
-
-LampClassifier::Class read_class(YamlMap map) {
-  constexpr int largest = std::numeric_limits<int>::max();
-  LampClassifier::Class lamp;
-  lamp.lamp = map.require("id").read_integer({0, largest});
-  lamp.examples = map.require("examples").read_integer({1, largest});
-  lamp.center = read_features(map.require("center"));
-  map.check_all_keys_read();
-  return lamp;
-}
-
 }  // namespace
 
+static void read_value(const YamlValue& value, Eigen::Matrix4d& covariance) {
+  std::vector<LampFeatures> rows;
+  read_value(value, rows);
+  if (rows.size() != kLampFeatures.size())
+    throw value.make_error("should be four rows of four numbers");
+  for (Eigen::Index row = 0; row < 4; ++row)
+    covariance.row(row) = rows[static_cast<std::size_t>(row)].transpose();
+  if (covariance != covariance.transpose() || !invert_positive_definite_matrix(covariance))
+    throw value.make_error("is not a covariance: it should be symmetric and positive");
+}
+
+static void write_value(YamlWriter& out, const Eigen::Matrix4d& covariance) {
+  out << YAML::BeginSeq;
+  for (int row = 0; row < 4; ++row) write_list(out, LampFeatures(covariance.row(row).transpose()));
+  out << YAML::EndSeq;
+}
+
+template <typename Io>
+static void describe(Io& io, Described<Io, LampClassifier::Class> lamp) {
+  io.required("id", lamp.lamp);
+  io.required("examples", lamp.examples, Range{1, std::numeric_limits<int>::max()});
+  io.required("center", lamp.center);
+}
+
+template <typename Io>
+static void describe(Io& io, Described<Io, LampClassifier> classifier) {
+  io.optional("row_time_s", classifier.row_time_s, Range{1e-8, 1e-3, "s"});
+  std::vector<std::string> names(kLampFeatures.begin(), kLampFeatures.end());
+  std::string known;
+  for (const std::string& name : names) known.append(known.empty() ? "" : ", ").append(name);
+  io.required("features", names, PlainText())
+      .check(std::ranges::equal(names, kLampFeatures),
+             "should be [" + known + "]: train the classifier again");
+  io.required("mean", classifier.mean);
+  io.required("scale", classifier.scale)
+      .check(classifier.scale.minCoeff() > 0, "should be positive");
+  const auto lamps = io.required("lamps", classifier.lamps);
+  // Written last, so that a truncated file lacks it.
+  io.required("covariance", classifier.covariance);
+  lamps.check(!classifier.lamps.empty(), "contains no lamp");
+  std::set<int> ids;
+  for (std::size_t i = 0; Io::is_reader && i < classifier.lamps.size(); ++i) {
+    const int id = classifier.lamps[i].lamp;
+    if (!ids.insert(id).second)
+      lamps.item(i).check(false, "id " + std::to_string(id) + " occurs twice");
+  }
+}
+
 LampClassifier read_lamp_classifier(const std::filesystem::path& file) {
-  YamlMap document = read_yaml_file(file, kFormat);
-  LampClassifier classifier;
-  if (const auto value = document.find("row_time_s")) {
-    classifier.row_time_s = value->read_number({1e-8, 1e-3, "s"});
-  }
-  check_features(document.require("features"));
-  classifier.mean = read_features(document.require("mean"));
-  const YamlValue scale = document.require("scale");
-  classifier.scale = read_features(scale);
-  if (!(classifier.scale.minCoeff() > 0)) throw scale.make_error("should be positive");
-  const auto lamps = document.require("lamps");
-  classifier.covariance = read_covariance(document.require("covariance"));
-  document.check_all_keys_read();
-  for (const YamlValue& item : lamps.read_list()) {
-    const auto lamp = read_class(item.read_mapping());
-    for (const auto& other : classifier.lamps) {
-      if (other.lamp == lamp.lamp) {
-        throw item.make_error("id " + std::to_string(lamp.lamp) + " occurs twice");
-      }
-    }
-    classifier.lamps.push_back(lamp);
-  }
-  if (classifier.lamps.empty()) throw lamps.make_error("contains no lamp");
-  return classifier;
+  return read_yaml_document<LampClassifier>(file, kFormat);
 }
 
 void write_lamp_classifier(const std::filesystem::path& file, const LampClassifier& classifier) {
-  YAML::Emitter out;
-  out << YAML::BeginMap;
-  emit_yaml_plain_word(out, "format", kFormat);
-  if (classifier.row_time_s) emit_yaml_number(out, "row_time_s", *classifier.row_time_s);
-  out << YAML::Key << "features" << YAML::Value << YAML::Flow << YAML::BeginSeq;
-  for (const std::string_view name : kLampFeatures) out << std::string(name);
-  out << YAML::EndSeq;
-  emit_yaml_numbers(out, "mean", classifier.mean);
-  emit_yaml_numbers(out, "scale", classifier.scale);
-  out << YAML::Key << "lamps" << YAML::Value << YAML::BeginSeq;
-  for (const auto& lamp : classifier.lamps) {
-    out << YAML::Flow << YAML::BeginMap;
-    emit_yaml_integer(out, "id", lamp.lamp);
-    emit_yaml_integer(out, "examples", lamp.examples);
-    emit_yaml_numbers(out, "center", lamp.center);
-    out << YAML::EndMap;
-  }
-  out << YAML::EndSeq;
-  // Written last, so that a truncated file lacks it.
-  out << YAML::Key << "covariance" << YAML::Value << YAML::BeginSeq;
-  for (int row = 0; row < 4; ++row) {
-    const LampFeatures values = classifier.covariance.row(row).transpose();
-    emit_yaml_inline_list(out, {values.data(), 4});
-  }
-  out << YAML::EndSeq << YAML::EndMap << YAML::Newline;
-  write_file(file, out.c_str());
+  write_file(file, format_yaml_document(kFormat, classifier));
 }
 
 }  // namespace vlp
