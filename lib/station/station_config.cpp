@@ -20,147 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kMany = 10'000;
-
-/// Returns the path in a value.
-fs::path resolve_path(const YamlValue& value, const fs::path& file) {
-  const fs::path path = value.read_text();
-  if (path.empty()) throw value.make_error("names nothing");
-  return path.is_absolute() ? path : file.parent_path() / path;
-}
-
-void read_optional_into(YamlMap& map, const char* key, int& target) {
-  if (const auto value = map.find(key)) target = value->read_integer({1, kMany});
-}
-void read_optional_into(YamlMap& map, const char* key, double& target, double max,
-                        const char* unit) {
-  if (const auto value = map.find(key)) target = value->read_number({0, max, unit});
-}
-
-CompletionCriteria read_completion_criteria(YamlMap map) {
-  CompletionCriteria sufficient;
-  read_optional_into(map, "board_views", sufficient.board_views);
-  read_optional_into(map, "board_coverage", sufficient.board_coverage, 1, "(share)");
-  read_optional_into(map, "turn_captures", sufficient.rotation_captures);
-  read_optional_into(map, "turn_heights", sufficient.rotation_heights);
-  double arc_deg = deg_from_rad(sufficient.rotation_arc_rad);
-  read_optional_into(map, "turn_arc_deg", arc_deg, 360, "degrees");
-  sufficient.rotation_arc_rad = rad_from_deg(arc_deg);
-  read_optional_into(map, "dispersion_captures", sufficient.dispersion_captures);
-  read_optional_into(map, "check_captures", sufficient.check_captures);
-  map.check_all_keys_read();
-  return sufficient;
-}
-
-void read_rejection_limits(YamlMap map, StationConfig& config) {
-  FrontendOptions& limits = config.frontend;
-  read_optional_into(map, "blur_fraction", limits.max_blur_fraction, 0.1, "(share)");
-  read_optional_into(map, "dark_fraction", limits.min_bright_fraction, 1, "(share)");
-  read_optional_into(map, "white_fraction", limits.max_white_fraction, 1, "(share)");
-  read_optional_into(map, "same_pose_fraction", limits.same_view_fraction, 1, "(share)");
-  read_optional_into(map, "max_consecutive_rejections", config.max_consecutive_rejections);
-  map.check_all_keys_read();
-}
-
-/// Reads the files that a station names, and stores their digests.
-class Files {
- public:
-  explicit Files(const fs::path& station) : station_(station) { add(station); }
-
-  fs::path operator()(const YamlValue& value) {
-    fs::path file = resolve_path(value, station_);
-    add(file);
-    return file;
-  }
-  std::string compute_sha256() const { return compute_text_sha256(digests_); }
-  const std::vector<fs::path>& file_names() const { return names_; }
-
- private:
-  void add(const fs::path& file) {
-    digests_ += compute_file_sha256(file) + "\n";
-    names_.push_back(file);
-  }
-
-  const fs::path& station_;
-  std::string digests_;
-  std::vector<fs::path> names_;
-};
-
-/// Reads a calibration whose camera has row time and readout.
-Calibration read_row_time_and_readout(const YamlValue& value, Files& files) {
-  Calibration calibration = read_calibration(files(value));
-  if (!calibration.camera.row_time_s || !calibration.camera.readout) {
-    throw value.make_error(
-        "its camera should have row_time_s and readout, which are needed to identify lamps");
-  }
-  return calibration;
-}
-
-/// Adds guard bands to gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
-void read_guard_bands(YamlMap map, std::vector<Gate>& gates) {
-  constexpr double max_k = 10, max_u = 1e6;
-  const YamlValue factor = map.require("k");
-  const double k = factor.read_number({0, max_k, "(factor)"});
-  const YamlValue stated = map.require("standard_uncertainties");
-  YamlMap uncertainties = stated.read_mapping();
-  int found = 0;
-  for (Gate& gate : gates) {
-    const auto value = uncertainties.find(gate.metric.c_str());
-    if (!value) continue;
-    ++found;
-    const double u = value->read_number({0, max_u, "(in the gate's unit)"});
-    if (!(u > 0)) throw value->make_error("should be above 0");
-    gate.guard_band = GuardBand{u, k};
-    const MetricKind kind = find_metric_kind(gate.metric).value();
-    const double accepted =
-        CheckedMetric{gate.metric, "", {}, gate.limit, kind.direction, gate.guard_band}
-            .acceptance_limit();
-    if (accepted >= 0 && accepted <= kind.max_limit) continue;
-    throw value->make_error(
-        "leaves no value within the gate: k times this uncertainty exceeds the limit; lower k");
-  }
-  uncertainties.check_all_keys_read();  // uncertainties of metrics without a gate
-  if (found == 0) throw stated.make_error("names no gate");
-  map.check_all_keys_read();
-}
-
-GoldenUnit read_golden(YamlMap map, Files& files) {
-  const YamlValue camera = map.require("camera_id");
-  if (!Id::is_valid_name_of_camera_or_run(camera.read_text()))
-    throw camera.make_error("is no id of a camera: it names a folder");
-  GoldenUnit golden{camera.read_text(), {}, {}};
-  const YamlValue calibration = map.require("calibration");
-  golden.calibration = read_row_time_and_readout(calibration, files);
-  if (!golden.calibration.rotation_center) {
-    throw calibration.make_error("should be a complete calibration: it has no rotation_center");
-  }
-  golden.gates = read_gates(map.require("gates"), list_unit_metric_kinds());
-  map.check_all_keys_read();
-  return golden;
-}
-
-VerificationInterval read_verification_interval(YamlMap map) {
-  VerificationInterval due;
-  constexpr double max_h = 10'000;
-  if (const auto hours = map.find("hours")) due.hours = hours->read_number({0, max_h, "h"});
-  if (const auto units = map.find("units")) due.units = units->read_integer({1, 1'000'000});
-  if (!due.hours && !due.units) throw map.make_error("should have hours or units");
-  if (due.hours == 0) throw map.make_error("hours should be above 0");
-  map.check_all_keys_read();
-  return due;
-}
-
-Retention read_retention(YamlMap map) {
-  Retention keep;
-  constexpr int max_days = 36'525;
-  const auto days = [&](const char* key, std::optional<int>& metric) {
-    if (const auto value = map.find(key)) metric = value->read_integer({1, max_days});
-  };
-  days("images_days", keep.images_days);
-  days("results_days", keep.results_days);
-  map.check_all_keys_read();
-  return keep;
-}
+constexpr Range kCount{1, 10'000}, kDays{1, 36'525}, kShare{0, 1, "(share)"};
 
 /// Iterator over a text that counts its steps, shared by its copies, and throws std::length_error
 /// beyond a limit. std::regex has no limit of its own, and tries nested repetitions in
@@ -216,111 +76,190 @@ std::string describe_serial_pattern_mismatch(const std::string& serial,
   return "'" + serial + "' is not of the form " + pattern;
 }
 
-std::string read_pattern(const YamlValue& value) {
-  std::string pattern = value.read_text();
-  try {
-    const std::regex compiled(pattern);
-  } catch (const std::regex_error& error) {
-    throw value.make_error(std::string("is no regular expression: ") + error.what());
-  }
-  return pattern;
-}
+/// Reader of the files that a station names. It collects the files and their digests.
+struct Files {
+  const fs::path& station;
+  std::vector<fs::path>& names;
+  std::string& digests;
 
-/// Reads the command of a hook. A program with a folder in its name is relative to the station;
-/// others are found by PATH.
-Hook read_hook(YamlMap map, const fs::path& file) {
-  Hook hook;
-  const YamlValue command = map.require("command");
-  for (const YamlValue& word : command.read_list()) hook.command.push_back(word.read_text());
-  if (hook.command.empty() || hook.command.front().empty()) {
-    throw command.make_error("should be a program and its arguments: [PROGRAM, ...]");
+  void add(const fs::path& file) const {
+    digests += compute_file_sha256(file) + "\n";
+    names.push_back(file);
   }
-  hook.folder = fs::absolute(file).parent_path();
-  std::string& program = hook.command.front();
-  if (program.find('/') != std::string::npos) program = (hook.folder / program).string();
-  constexpr double max_s = 3600;
-  if (const auto limit = map.find("time_limit_s")) {
-    hook.time_limit_s = limit->read_number({0, max_s, "seconds"});
-    if (!(hook.time_limit_s > 0)) throw limit->make_error("should be above 0");
+  fs::path operator()(const YamlValue& value) const {
+    fs::path file;
+    (*this)(value, file);
+    add(file);
+    return file;
   }
-  map.check_all_keys_read();
-  return hook;
-}
+  /// Reads a path, relative to the station.
+  void operator()(const YamlValue& value, fs::path& path) const {
+    path = value.read_text();
+    if (path.empty()) throw value.make_error("names nothing");
+    if (path.is_relative()) path = station.parent_path() / path;
+  }
+  /// Reads a calibration whose camera has row time and readout.
+  void operator()(const YamlValue& value, Calibration& calibration) const {
+    calibration = read_calibration((*this)(value));
+    if (!calibration.camera.row_time_s || !calibration.camera.readout) {
+      throw value.make_error(
+          "its camera should have row_time_s and readout, which are needed to identify lamps");
+    }
+  }
+  void operator()(const YamlValue& value, Board& board) const {
+    board = read_board((*this)(value));
+    if (board.has_chessboard_squares())
+      throw value.make_error("is a board of squares: the station looks for one of AprilTags");
+  }
+};
 
-/// Returns a database: a file relative to the station, or a server.
-std::string read_records_address(const YamlValue& value, const fs::path& file) {
+/// Reads a database: a file relative to the station, or a server.
+std::string read_records_address(const YamlValue& value, const Files& files) {
   const std::string where = value.read_text();
   if (where.starts_with("postgresql://") || where.starts_with("postgres://")) return where;
   if (is_database_server_address(where))
     throw value.make_error("should name a file, or be postgresql://...");
   describe_database(where);  // checks the name of a file
-  return resolve_path(value, file).string();
+  fs::path file;
+  files(value, file);
+  return file.string();
 }
 
-/// Reads the camera type and the targets that it observes: board, lamps and known position.
-void read_camera_and_targets(YamlMap& document, Files& files, StationConfig& config) {
-  const YamlValue type = document.require("camera_type");
-  config.nominal_camera = read_row_time_and_readout(type, files).camera;
-  config.type_file = fs::path(type.read_text()).filename().string();
-  const YamlValue board = document.require("board");
-  config.board = read_board(files(board));
-  if (config.board.has_chessboard_squares()) {
-    throw board.make_error("is a board of squares: the station looks for one of AprilTags");
+/// Reads the standard uncertainties of metrics, and adds guard bands with the factor k to gates.
+void read_guard_bands(YamlMap& io, std::vector<Gate>& gates, double k) {
+  bool has_found = false;
+  for (Gate& gate : gates) {
+    double u = 0;
+    const YamlField field = io.optional(gate.metric, u, Range{0, 1e6, "(in the gate's unit)"});
+    if (!field) continue;
+    has_found = true;
+    field.check(u > 0, "should be above 0");
+    gate.guard_band = GuardBand{u, k};
+    const MetricKind kind = find_metric_kind(gate.metric).value();
+    const double accepted =
+        CheckedMetric{gate.metric, "", {}, gate.limit, kind.direction, gate.guard_band}
+            .acceptance_limit();
+    field.check(
+        accepted >= 0 && accepted <= kind.max_limit,
+        "leaves no value within the gate: k times this uncertainty exceeds the limit; lower k");
   }
-  const auto room = document.find("room");
-  config.lamps = read_overhead_lamps_of_room(files(document.require("lamps")),
-                                             room ? room->read_text() : std::string());
-  if (const auto place = document.find("dispersion_position_m")) {
-    config.dispersion_position_m = Eigen::Vector2d(place->read_numbers(2).data());
-  }
+  io.check_all_keys_read();  // uncertainties of metrics without a gate
+  io.check(has_found, "names no gate");
 }
 
-/// Reads the conditions of a verdict: completion, rejection of images, gates and golden unit.
-void read_verdict_conditions(YamlMap& document, Files& files, StationConfig& config) {
-  if (const auto sufficient = document.find("completion"))
-    config.completion = read_completion_criteria(sufficient->read_mapping());
-  if (const auto refuse = document.find("rejection"))
-    read_rejection_limits(refuse->read_mapping(), config);
-  config.gates = read_gates(document.require("gates"), list_unit_metric_kinds());
-  if (const auto guard = document.find("guard_bands")) {
-    read_guard_bands(guard->read_mapping(), config.gates);
+/// Checks that a pattern is a regular expression.
+void check_pattern(const std::string& pattern, const YamlField& field) {
+  try {
+    const std::regex compiled(pattern);
+  } catch (const std::regex_error& error) {
+    field.check(false, std::string("is no regular expression: ") + error.what());
   }
-  if (const auto golden = document.find("golden")) {
-    config.golden_unit = read_golden(golden->read_mapping(), files);
-  }
-  if (const auto due = document.find("verify_due")) {
-    if (!config.golden_unit) throw due->make_error("needs a golden unit: add the key 'golden'");
-    config.verification_interval = read_verification_interval(due->read_mapping());
-  }
-}
-
-/// Reads the valid serials, and the operators who may void runs.
-void read_serials_and_operators(YamlMap& document, StationConfig& config) {
-  if (const auto pattern = document.find("serial_pattern")) {
-    config.serial_pattern = read_pattern(*pattern);
-  }
-  if (const auto operators = document.find("void_operators")) {
-    const std::vector<YamlValue> names = operators->read_list();
-    if (names.empty())
-      throw operators->make_error("names nobody; leave it out if all may void runs");
-    std::ranges::transform(names, std::back_inserter(config.void_operators),
-                           [](const YamlValue& name) { return name.read_text(); });
-  }
-}
-
-/// Reads the folders of images and results, and where and how long runs are kept.
-void read_storage(YamlMap& document, StationConfig& config) {
-  const fs::path& file = config.file;
-  config.captures = resolve_path(document.require("captures"), file);
-  config.results = resolve_path(document.require("results"), file);
-  config.records = read_records_address(document.require("records"), file);
-  const auto spool = document.find("spool");
-  config.spool = spool ? resolve_path(*spool, file) : file.parent_path() / "spool";
-  if (const auto keep = document.find("retention"))
-    config.retention = read_retention(keep->read_mapping());
 }
 
 }  // namespace
+
+static void describe(YamlMap& io, CompletionCriteria& sufficient) {
+  io.optional("board_views", sufficient.board_views, kCount);
+  io.optional("board_coverage", sufficient.board_coverage, kShare);
+  io.optional("turn_captures", sufficient.rotation_captures, kCount);
+  io.optional("turn_heights", sufficient.rotation_heights, kCount);
+  io.optional("turn_arc_deg", sufficient.rotation_arc_rad, DegreeRange{0, 360});
+  io.optional("dispersion_captures", sufficient.dispersion_captures, kCount);
+  io.optional("check_captures", sufficient.check_captures, kCount);
+}
+
+static void describe_rejection(YamlMap& io, StationConfig& config) {
+  FrontendOptions& limits = config.frontend;
+  io.optional("blur_fraction", limits.max_blur_fraction, Range{0, 0.1, "(share)"});
+  io.optional("dark_fraction", limits.min_bright_fraction, kShare);
+  io.optional("white_fraction", limits.max_white_fraction, kShare);
+  io.optional("same_pose_fraction", limits.same_view_fraction, kShare);
+  io.optional("max_consecutive_rejections", config.max_consecutive_rejections, kCount);
+}
+
+/// Describes guard bands of gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
+static void describe_guard_bands(YamlMap& io, StationConfig& config) {
+  double k = 0;
+  io.required("k", k, Range{0, 10, "(factor)"});
+  YamlMap uncertainties = io.require("standard_uncertainties").read_mapping();
+  read_guard_bands(uncertainties, config.gates, k);
+}
+
+static void describe(YamlMap& io, GoldenUnit& golden, const Files& files) {
+  io.required("camera_id", golden.camera_id)
+      .check(Id::is_valid_name_of_camera_or_run(golden.camera_id),
+             "is no id of a camera: it names a folder");
+  io.required("calibration", golden.calibration, files)
+      .check(golden.calibration.rotation_center.has_value(),
+             "should be a complete calibration: it has no rotation_center");
+  golden.gates = read_gates(io.require("gates"), list_unit_metric_kinds());
+}
+
+static void describe(YamlMap& io, VerificationInterval& due) {
+  io.optional("hours", due.hours, Range{0, 10'000, "h"});
+  io.optional("units", due.units, Range{1, 1'000'000});
+  io.check(due.hours || due.units, "should have hours or units");
+  io.check(due.hours != 0, "hours should be above 0");
+}
+
+static void describe(YamlMap& io, Retention& retention) {
+  io.optional("images_days", retention.images_days, kDays);
+  io.optional("results_days", retention.results_days, kDays);
+}
+
+/// Describes the command of a hook. A program with a folder in its name is relative to the station;
+/// others are found by PATH.
+static void describe(YamlMap& io, Hook& hook, const Files& files) {
+  io.required("command", hook.command)
+      .check(!hook.command.empty() && !hook.command.front().empty(),
+             "should be a program and its arguments: [PROGRAM, ...]");
+  hook.folder = fs::absolute(files.station).parent_path();
+  std::string& program = hook.command.front();
+  if (program.find('/') != std::string::npos) program = (hook.folder / program).string();
+  io.optional("time_limit_s", hook.time_limit_s, Range{0, 3600, "seconds"})
+      .check(hook.time_limit_s > 0, "should be above 0");
+}
+
+/// Describes the camera type and the targets that it observes: board, lamps and known position.
+static void describe_camera_and_targets(YamlMap& io, StationConfig& config, const Files& files) {
+  Calibration type;
+  io.required("camera_type", type, files);
+  config.nominal_camera = type.camera;
+  config.type_file = config.inputs.back().filename().string();
+  io.required("board", config.board, files);
+  std::string room;
+  io.optional("room", room);
+  config.lamps = read_overhead_lamps_of_room(files(io.require("lamps")), room);
+  io.optional("dispersion_position_m", config.dispersion_position_m);
+}
+
+/// Describes the conditions of a verdict: completion, rejection of images, gates and golden unit.
+static void describe_verdict(YamlMap& io, StationConfig& config, const Files& files) {
+  io.optional("completion", config.completion);
+  io.optional("rejection", config, describe_rejection);
+  config.gates = read_gates(io.require("gates"), list_unit_metric_kinds());
+  io.optional("guard_bands", config, describe_guard_bands);
+  io.optional("golden", config.golden_unit, files);
+  io.optional("verify_due", config.verification_interval)
+      .check(config.golden_unit.has_value(), "needs a golden unit: add the key 'golden'");
+}
+
+static void describe(YamlMap& io, StationConfig& config, const Files& files) {
+  io.required("station", config.station);
+  describe_camera_and_targets(io, config, files);
+  describe_verdict(io, config, files);
+  const YamlField pattern = io.optional("serial_pattern", config.serial_pattern);
+  check_pattern(config.serial_pattern, pattern);
+  io.optional("void_operators", config.void_operators)
+      .check(!config.void_operators.empty(), "names nobody; leave it out if all may void runs");
+  io.required("captures", config.captures, files);
+  io.required("results", config.results, files);
+  config.records = read_records_address(io.require("records"), files);
+  config.spool = config.file.parent_path() / "spool";
+  io.optional("spool", config.spool, files);
+  io.optional("retention", config.retention);
+  io.optional("hook", config.hook, files);
+}
 
 std::string describe_camera_id_problem(const std::string& camera_id) {
   if (std::regex_match(camera_id, std::regex("[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}"))) return "";
@@ -340,23 +279,19 @@ std::vector<MetricKind> list_unit_metric_kinds() {
 
 StationConfig read_station_config(const fs::path& file) {
   YamlMap document = read_yaml_file(file, "vlp-station/1");
-  Files files(file);
   StationConfig config;
   config.file = file;
-  config.station = document.require("station").read_text();
-  read_camera_and_targets(document, files, config);
-  read_verdict_conditions(document, files, config);
-  read_serials_and_operators(document, config);
-  read_storage(document, config);
-  if (const auto hook = document.find("hook")) config.hook = read_hook(hook->read_mapping(), file);
+  std::string digests;
+  const Files files{file, config.inputs, digests};
+  files.add(file);
+  describe(document, config, files);
   document.check_all_keys_read();
   const auto& lamps = config.lamps.lamps;
   if (std::none_of(lamps.begin(), lamps.end(), [](const Lamp& l) { return l.frequency_hz; })) {
     throw InputError(
         file, "no lamp of the map has a frequency_hz, which is needed to identify lamps; add it");
   }
-  config.inputs = files.file_names();
-  config.sha256 = files.compute_sha256();
+  config.sha256 = compute_text_sha256(digests);
   return config;
 }
 
