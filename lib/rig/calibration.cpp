@@ -169,9 +169,12 @@ void describe(Io& io, Described<Io, Camera> camera) {
   io.optional("readout", camera.readout, kReadoutWords);
   io.required("imager_px", camera.imager_px, Range{1, 1 << 20});
   io.required("lens_model", camera.lens_model);
-  io.required("intrinsics", camera.intrinsics, num_lens_parameters(camera.lens_model))
-      .check(camera.focal_px().minCoeff() > 0,
-             "the focal lengths, the first two, should be positive");
+  const auto intrinsics =
+      io.required("intrinsics", camera.intrinsics, num_lens_parameters(camera.lens_model));
+  if constexpr (Io::is_reader) {
+    intrinsics.check(camera.focal_px().minCoeff() > 0,
+                     "the focal lengths, the first two, should be positive");
+  }
 }
 
 template void describe<YamlMap>(YamlMap& io, Camera& camera);
