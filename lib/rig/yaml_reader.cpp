@@ -321,9 +321,8 @@ InputError YamlValue::make_unknown_word_error(const std::string& known) const {
   return make_error(describe_yaml_value(*node_) + " is unknown; " + known);
 }
 
-const YamlField& YamlField::check(bool is_valid, std::string_view problem) const {
+void YamlField::check(bool is_valid, std::string_view problem) const {
   if (value_ && !is_valid) throw value_->make_error(std::string(problem));
-  return *this;
 }
 
 void YamlField::check_within(const Range& range) const {

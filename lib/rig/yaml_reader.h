@@ -53,7 +53,7 @@ class YamlValue {
   int read_integer(const Range& range) const;
   bool read_boolean() const;
   std::string read_text() const;
-  /// Returns the index of the value's word.
+  /// Returns the index of the value's word. Throws InputError for other words.
   std::size_t read_word(const Words& words) const;
   /// Returns a list of exactly `count` finite numbers.
   std::vector<double> read_numbers(std::size_t count) const;
@@ -79,11 +79,11 @@ class YamlField {
 
   /// Returns true if the file has the value.
   explicit operator bool() const { return value_.has_value(); }
-  /// Throws InputError at the value if it is not valid.
-  const YamlField& check(bool is_valid, std::string_view problem) const;
-  /// Checks a number.
+  /// Throws InputError with `problem` at the value if it is not valid.
+  void check(bool is_valid, std::string_view problem) const;
+  /// Throws InputError if a number is outside the range.
   void check_within(const Range& range) const;
-  /// Returns an item of a list.
+  /// Returns an item of a list. @pre The list has it.
   YamlField item(std::size_t index) const;
 
  private:
@@ -152,9 +152,9 @@ class YamlMap {
   std::vector<std::string> known_;
 };
 
-/// Read a value into `target`; the items of a list, with the same limits. A mapping is read by
-/// describe(). A function of `target` and of a YamlValue, or of a YamlMap&, may be given in place
-/// of limits.
+/// Read a value into `target`. Limits of a list apply to each item. A mapping is read by
+/// describe(). In place of limits, a function of a YamlValue, or of a YamlMap&, and of `target` may
+/// be given.
 /// @throws InputError if the value is invalid, or if a mapping has a key that was not read
 inline void read_value(const YamlValue& value, double& target) { target = value.read_number(); }
 inline void read_value(const YamlValue& value, double& target, const Range& range) {
@@ -167,8 +167,7 @@ inline void read_value(const YamlValue& value, int& target, const Range& range =
   target = value.read_integer(range);
 }
 inline void read_value(const YamlValue& value, bool& target) { target = value.read_boolean(); }
-inline void read_value(const YamlValue& value, std::string& target) { target = value.read_text(); }
-inline void read_value(const YamlValue& value, std::string& target, PlainText) {
+inline void read_value(const YamlValue& value, std::string& target, PlainText = {}) {
   target = value.read_text();
 }
 inline void read_value(const YamlValue& value, std::string& target, const Words& words) {
@@ -238,12 +237,11 @@ YamlMap read_yaml_file(const std::filesystem::path& file, const std::string& for
 /// Checks that the key `format` of a mapping has this value. Throws InputError otherwise.
 void check_yaml_format(YamlMap& map, const std::string& format);
 /// Reads a file of a described type. Throws InputError as read_yaml_file() and read_value().
-template <typename T, typename... Context>
-T read_yaml_document(const std::filesystem::path& file, const std::string& format,
-                     const Context&... context) {
+template <typename T>
+T read_yaml_document(const std::filesystem::path& file, const std::string& format) {
   YamlMap map = read_yaml_file(file, format);
   T document{};
-  describe(map, document, context...);
+  describe(map, document);
   map.check_all_keys_read();
   return document;
 }
