@@ -46,6 +46,14 @@ struct LampDisplacements {
   /// Fraction of the detections that is used.
   double inlier_fraction = 1;
 
+  /// Returns the ids of the lamps of which all detections are outliers.
+  std::vector<int> list_rejected_lamps() const {
+    std::vector<int> ids;
+    for (const auto& [lamp, residuals_px] : outliers_px)
+      if (std::ranges::find(lamps, lamp) == lamps.end()) ids.push_back(lamp);
+    return ids;
+  }
+
   /// Returns the displaced position of a lamp, up to a similarity of all lamps.
   Eigen::Vector2d displaced_lamp_position_m(std::size_t lamp) const {
     return map_m[lamp] + displacement_m.segment<2>(2 * static_cast<Eigen::Index>(lamp));
@@ -401,8 +409,9 @@ OtherMap swap_lamps(const LampMap& map, int first, int second) {
   return other;
 }
 
-/// Returns the two maps with two lamps swapped that have the smallest displacements, best first.
-/// Omits maps whose displacements are no smaller than those of the original map.
+/// Returns the two maps with two lamps swapped that have the smallest displacements, best first,
+/// and those with two lamps swapped of which all detections are outliers. Omits maps whose
+/// displacements are no smaller than those of the original map.
 std::vector<OtherMap> make_swapped_maps(const LampDisplacements& found, const LampMap& map) {
   std::vector<Eigen::Vector2d> lamps_m = found.map_m;
   Eigen::VectorXd displaced_m = found.displacement_m;
@@ -433,6 +442,10 @@ std::vector<OtherMap> make_swapped_maps(const LampDisplacements& found, const La
   for (const auto& [squares, k, i] : pairs) {
     maps.push_back(swap_lamps(map, found.lamps[k], found.lamps[i]));
     if (maps.size() == 2) break;
+  }
+  const std::vector<int> rejected = found.list_rejected_lamps();
+  for (std::size_t i = 0; i < rejected.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) maps.push_back(swap_lamps(map, rejected[k], rejected[i]));
   }
   return maps;
 }
@@ -492,7 +505,7 @@ std::optional<MapError> find_swapped_lamps(const MapCaptures& captures, const La
   const double limit = test.fit_map_errors({}, added_m2).chi_squared +
                        test.compute_chi_squared_drop_bound(0, 1 + count * (count - 1) / 2);
   const auto is_worse = [&](const std::optional<LampDisplacements>& other) {
-    return is_map_contradicted(other) ||
+    return is_map_contradicted(other) || other->lamps.size() < others[best].found->lamps.size() ||
            DisplacementTest(*other, map).fit_map_errors({}, added_m2).chi_squared > limit;
   };
   if (!is_worse(found)) return std::nullopt;
