@@ -518,7 +518,7 @@ void LightDetector::measure_stripes_in_outline(const ImageView& lines, const Bac
   if (!are_stripes_readable(stripes)) return;
   const auto lamp = period && lamps_by_period_[*period] ? lamps_by_period_[*period]
                                                         : identify_lamp_by_stripes(stripes);
-  if (light.lamp && !period && !(lamp && has_clear_outline(light))) return;
+  if (light.lamp && (!lamp || !(period || has_clear_outline(light)))) return;
   // An object may hide a part of the outline; the box of a slanted tube may contain other lights.
   stripes.coherence = std::max(
       light.stripes.coherence,

@@ -41,7 +41,7 @@ inline std::string numbered_run_id(int number) {
   return "20261121T13450" + std::to_string(number % 10) + "Z-" + std::to_string(1000 + number);
 }
 
-/// Returns the ids of the runs that match the filter, of Records, a Spool or KnownRuns.
+/// Returns the ids of the runs that match the filter, of Records or a Spool.
 template <typename Runs>
 std::vector<std::string> list_ids(Runs& runs, const RunFilter& filter) {
   std::vector<std::string> ids;

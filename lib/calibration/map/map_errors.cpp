@@ -46,7 +46,7 @@ struct LampDisplacements {
   /// Fraction of the detections that is used.
   double inlier_fraction = 1;
 
-  /// Returns the ids of the lamps of which all detections are outliers.
+  /// Returns the ids of the lamps with outliers and without used detections.
   std::vector<int> list_rejected_lamps() const {
     std::vector<int> ids;
     for (const auto& [lamp, residuals_px] : outliers_px)
@@ -409,9 +409,9 @@ OtherMap swap_lamps(const LampMap& map, int first, int second) {
   return other;
 }
 
-/// Returns the two maps with two lamps swapped that have the smallest displacements, best first,
-/// and those with two lamps swapped of which all detections are outliers. Omits maps whose
-/// displacements are no smaller than those of the original map.
+/// Returns the two maps with two lamps swapped that have the smallest displacements, best first.
+/// Omits maps whose displacements are no smaller than those of the original map. Adds the maps with
+/// two lamps swapped of which no detection is used.
 std::vector<OtherMap> make_swapped_maps(const LampDisplacements& found, const LampMap& map) {
   std::vector<Eigen::Vector2d> lamps_m = found.map_m;
   Eigen::VectorXd displaced_m = found.displacement_m;
@@ -443,8 +443,9 @@ std::vector<OtherMap> make_swapped_maps(const LampDisplacements& found, const La
     maps.push_back(swap_lamps(map, found.lamps[k], found.lamps[i]));
     if (maps.size() == 2) break;
   }
+  constexpr std::size_t max_rejected = 5;  // more lamps indicate an error of the whole map
   const std::vector<int> rejected = found.list_rejected_lamps();
-  for (std::size_t i = 0; i < rejected.size(); ++i) {
+  for (std::size_t i = 0; i < rejected.size() && rejected.size() <= max_rejected; ++i) {
     for (std::size_t k = 0; k < i; ++k) maps.push_back(swap_lamps(map, rejected[k], rejected[i]));
   }
   return maps;

@@ -178,10 +178,11 @@ class Face {
       brightest.push_back(*tenth);
     }
     const PeriodFit fit = fit_periodic_signal(profile, period_lines);
+    const bool has_stripes = fit.depth > 0;
     for (int row = 0; row < box_.height; ++row) {
       const double phase_rad = 2 * std::numbers::pi * (box_.y + row) / period_lines - fit.phase_rad;
       const double level = brightest[static_cast<std::size_t>(row)];
-      if (level < min_level || (period_lines > 0 && std::cos(phase_rad) < 0)) continue;
+      if (level < min_level || (has_stripes && std::cos(phase_rad) < 0)) continue;
       lit_.push_back(box_.y + row);
       lit_levels.push_back(level);
     }

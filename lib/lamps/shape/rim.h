@@ -26,10 +26,10 @@ namespace vlp {
 /// threshold, and at least 2 % of the brightest level.
 ///
 /// 1. Searches the circle in the level plane whose crossings with the scanlines in the brighter
-/// half of the period have the largest sum of e. Its mean has to be at least 0.28 if the radius is
-/// unknown. (Daugman 1993 sums steps of irises.) Circles in the image would follow a part of a rim
-/// that is viewed obliquely. Without a lens also the ellipse with the second moments of the blob is
-/// searched. It is used if its sum is 1.2 times as large.
+/// half of the period have the largest sum of e. Its mean has to be at least 0.28, or 0.1 if
+/// the radius is known. (Daugman 1993 sums steps of irises.) Circles in the image would follow a
+/// part of a rim that is viewed obliquely. Without a lens also the ellipse with the second moments
+/// of the blob is searched. It is used if its sum is 1.2 times as large.
 ///
 /// 2. Fits the outline to the pixels near this circle, see fit_disc_outline().
 ///

@@ -471,7 +471,8 @@ std::optional<std::size_t> identify_lamp_period(const LineProfile& profile,
   if (lamp_periods_lines.empty() || profile.levels.empty()) return std::nullopt;
   const std::vector<PeriodFit> fits = fit_lamp_periods(profile, lamp_periods_lines);
   const auto lamp = choose_lamp(fits, [](std::size_t) { return true; });
-  if (!lamp || fits[*lamp].depth <= kMinLightDepth) return std::nullopt;
+  if (!lamp || fits[*lamp].depth <= kMinLightDepth || fits[*lamp].periods < kMinPeriods)
+    return std::nullopt;
   const double shortest = *std::ranges::min_element(lamp_periods_lines);
   const PeriodFit any = find_best_fitting_period(profile, std::max(kMinPeriod_lines, shortest / 2));
   return compute_log_ratio(any, fits[*lamp]) > kMinLogRatio ? std::nullopt : lamp;
@@ -481,6 +482,7 @@ Stripes measure_stripes_of_period(const LineProfile& profile, double period_line
   const PeriodFit fit = fit_period_near(profile, period_lines, 2 * kLampDrift);
   Stripes stripes = measure_stripes(divide_profile_by_envelope(profile, fit.period_lines));
   stripes.period_lines = fit.period_lines;
+  stripes.periods = fit.periods;
   stripes.periodicity_r2 = 1 - fit.unexplained_fraction;
   stripes.is_regular = true;
   return stripes;

@@ -80,14 +80,16 @@ std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
                                                   std::span<const double> lamp_periods_lines);
 
 /// Returns the index of the lamp period that a profile has. Returns std::nullopt if no period
-/// explains 55 % of the variance of the profile with a modulation depth of 0.3, or if another
-/// period, also of no lamp, is nearly as probable: the odds have to be 55.
+/// explains 55 % of the variance of the profile with a modulation depth of 0.3, if there are less
+/// than kMinPeriods periods, or if another period, whether of a lamp or not, is nearly as probable:
+/// the odds have to be at least 55.
 std::optional<std::size_t> identify_lamp_period(const LineProfile& profile,
                                                 std::span<const double> lamp_periods_lines);
 
-/// Measures the stripes of a profile of about this period after division by its envelope. Their
-/// period is that of a fit beyond the drift of a lamp, which does not depend on the given row time.
-/// Stripes that the ends of a light cut bias that of measure_stripes(). The coherence is not set.
+/// Measures the stripes of a profile with approximately this period after division by its envelope.
+/// Their period is that of a fit beyond the drift of a lamp, which does not depend on the given row
+/// time. Stripes that the ends of a light cut bias that of measure_stripes(). The coherence is not
+/// set.
 Stripes measure_stripes_of_period(const LineProfile& profile, double period_lines);
 
 }  // namespace vlp

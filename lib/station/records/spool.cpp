@@ -80,6 +80,7 @@ std::string Spool::try_database_action(const std::function<void(Records&)>& acti
     if (!records_) records_ = std::make_unique<Records>(where_);
     action(*records_);
     offline_reason_.clear();
+    next_access_ = {};
     return "";
   } catch (const InputError& error) {
     const bool is_offline = dynamic_cast<const RecordsOffline*>(&error) != nullptr;

@@ -18,7 +18,7 @@
 
 namespace vlp {
 
-/// Error if records are offline that a command needs. what() is for the operator, `details` has the
+/// Error if a command needs records that are offline. what() is for the operator, `details` has the
 /// reason.
 class RecordsUnavailable : public std::runtime_error {
  public:
