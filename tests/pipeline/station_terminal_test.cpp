@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <regex>
 #include <thread>
+#include <utility>
 
 #include "small_station.h"
 
@@ -44,12 +45,13 @@ class Tmux {
     while (text.ends_with("\n\n")) text.pop_back();
     return text;
   }
-  /// The same once it holds a text; what it is after half a minute otherwise.
+  /// Returns the screen when it contains a text and has not changed for 50 ms, so that it is drawn
+  /// completely; the present screen after half a minute.
   std::string screen_with(const std::string& text) const {
-    std::string shown;
+    std::string before, shown;
     for (int i = 0; i < 600; ++i) {
-      shown = screen();
-      if (shown.find(text) != std::string::npos) return shown;
+      before = std::exchange(shown, screen());
+      if (shown == before && shown.find(text) != std::string::npos) return shown;
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
     return shown;

@@ -24,18 +24,18 @@ std::vector<std::string> list_table_statements() {
           " TEXT NOT NULL, document TEXT NOT NULL, destination TEXT NOT NULL, PRIMARY KEY (run))",
       "CREATE INDEX IF NOT EXISTS runs_by_camera ON runs (camera)",
       // value: NULL if it could not be measured; gate: NULL without a gate
-      "CREATE TABLE IF NOT EXISTS metrics (run TEXT NOT NULL REFERENCES runs (run), "
-      "name TEXT NOT NULL, value DOUBLE PRECISION, gate DOUBLE PRECISION, "
-      "PRIMARY KEY (run, name))",
-      "CREATE TABLE IF NOT EXISTS images (run TEXT NOT NULL REFERENCES runs (run), "
-      "sha256 TEXT NOT NULL, PRIMARY KEY (sha256, run))",
-      "CREATE TABLE IF NOT EXISTS events (event TEXT PRIMARY KEY, "
-      "run TEXT NOT NULL REFERENCES runs (run), what TEXT NOT NULL, text TEXT NOT NULL, "
-      "who TEXT NOT NULL DEFAULT '')",
+      ("CREATE TABLE IF NOT EXISTS metrics (run TEXT NOT NULL REFERENCES runs (run), "
+       "name TEXT NOT NULL, value DOUBLE PRECISION, gate DOUBLE PRECISION, "
+       "PRIMARY KEY (run, name))"),
+      ("CREATE TABLE IF NOT EXISTS images (run TEXT NOT NULL REFERENCES runs (run), "
+       "sha256 TEXT NOT NULL, PRIMARY KEY (sha256, run))"),
+      ("CREATE TABLE IF NOT EXISTS events (event TEXT PRIMARY KEY, "
+       "run TEXT NOT NULL REFERENCES runs (run), what TEXT NOT NULL, text TEXT NOT NULL, "
+       "who TEXT NOT NULL DEFAULT '')"),
       "CREATE INDEX IF NOT EXISTS events_by_run ON events (run)",
       // Without a reference to runs, so that an entry remains when its run is removed.
-      "CREATE TABLE IF NOT EXISTS trail (number BIGINT PRIMARY KEY, run TEXT NOT NULL, "
-      "event TEXT NOT NULL, content TEXT NOT NULL, digest TEXT NOT NULL)"};
+      ("CREATE TABLE IF NOT EXISTS trail (number BIGINT PRIMARY KEY, run TEXT NOT NULL, "
+       "event TEXT NOT NULL, content TEXT NOT NULL, digest TEXT NOT NULL)")};
 }
 
 bool is_sqlite(soci::session& sql) { return sql.get_backend_name() == "sqlite3"; }
