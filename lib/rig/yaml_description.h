@@ -34,7 +34,7 @@ struct Range {
   std::string_view unit = {};
 };
 
-/// An id or a number of things.
+/// Range of an id or of a count.
 inline constexpr Range kAnyIndex{0, std::numeric_limits<int>::max()};
 
 /// Words for the values of an enumeration, in its order from 0. Messages list them, with

@@ -49,8 +49,9 @@ struct LampDisplacements {
   /// Returns the ids of the lamps with outliers and without used detections.
   std::vector<int> list_rejected_lamps() const {
     std::vector<int> ids;
-    for (const auto& [lamp, residuals_px] : outliers_px)
+    for (const auto& [lamp, residuals_px] : outliers_px) {
       if (std::ranges::find(lamps, lamp) == lamps.end()) ids.push_back(lamp);
+    }
     return ids;
   }
 

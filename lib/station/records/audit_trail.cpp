@@ -23,7 +23,7 @@ std::string compute_digest(const std::vector<std::string>& texts) {
   return compute_text_sha256(all);
 }
 
-/// Computes the digest of a run, its SHA-256; empty if its rows are not those of its document.
+/// Returns the SHA-256 of the document of a run; empty if its rows are not those of its document.
 std::string compute_digest_of_rows(const RunRows& rows) {
   try {
     return rows == make_run_rows(rows.document) ? compute_text_sha256(rows.document) : "";

@@ -101,7 +101,7 @@ class Records {
   /// different run of the same id is an error.
   /// @param destination  identity of other records, to which the run is to be delivered; else empty
   void store_run(const RunRecord& record, const std::string& destination = "");
-  /// Removes a delivered run with its trail, unless it has got another event meanwhile.
+  /// Removes a delivered run with its trail, unless an event was added since it was read.
   void remove_delivered_run(const RunRecord& record);
   /// Returns a complete run; std::nullopt if no run has this id.
   std::optional<RunRecord> find_run_by_id(const std::string& run);
