@@ -152,6 +152,12 @@ class YamlMap {
   std::vector<std::string> known_;
 };
 
+/// A function that reads a value into a T.
+template <typename Read, typename T>
+concept ReaderOf = std::invocable<Read, const YamlValue&, T&>;
+template <typename T, typename... Context>
+concept ReadWithLimits = (!ReaderOf<Context, T> && ...);
+
 /// Read a value into `target`. Limits of a list apply to each item. A mapping is read by
 /// describe(). In place of limits, a function of a YamlValue, or of a YamlMap&, and of `target` may
 /// be given.
@@ -182,6 +188,7 @@ void read_value(const YamlValue& value, Enumeration& target, const Words& words)
   target = static_cast<Enumeration>(value.read_word(words));
 }
 template <int N, typename... Limits>
+requires ReadWithLimits<Eigen::Matrix<double, N, 1>, Limits...>
 void read_value(const YamlValue& value, Eigen::Matrix<double, N, 1>& target,
                 const Limits&... limits) {
   value.read_numbers(N);
@@ -189,6 +196,7 @@ void read_value(const YamlValue& value, Eigen::Matrix<double, N, 1>& target,
     read_value(item, target[i++], limits...);
 }
 template <typename... Limits>
+requires ReadWithLimits<std::pair<double, double>, Limits...>
 void read_value(const YamlValue& value, std::pair<double, double>& target,
                 const Limits&... limits) {
   Eigen::Vector2d numbers;
@@ -196,13 +204,15 @@ void read_value(const YamlValue& value, std::pair<double, double>& target,
   target = {numbers[0], numbers[1]};
 }
 template <typename T, typename Read>
-requires std::invocable<Read, const YamlValue&, T&>
+requires ReaderOf<Read, T>
 void read_value(const YamlValue& value, T& target, const Read& read) { read(value, target); }
 template <typename T, typename... Context>
+requires ReadWithLimits<std::optional<T>, Context...>
 void read_value(const YamlValue& value, std::optional<T>& target, const Context&... context) {
   read_value(value, target.emplace(), context...);
 }
 template <typename T, typename... Context>
+requires ReadWithLimits<std::vector<T>, Context...>
 void read_value(const YamlValue& value, std::vector<T>& target, const Context&... context) {
   target.clear();
   for (const YamlValue& item : value.read_list())
