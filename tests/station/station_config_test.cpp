@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <regex>
 
 #include "support/datasets.h"
@@ -13,7 +14,6 @@
 namespace vlp {
 namespace {
 
-using testing::AllOf;
 using testing::HasSubstr;
 using testing::SizeIs;
 
@@ -71,95 +71,109 @@ TEST_F(ReadStationConfig, AcceptsOptionalKeysOfExampleWhenUncommented) {
   EXPECT_EQ(config.retention.images_days, 90);
 }
 
-TEST_F(ReadStationConfig, RejectsUnknownGateWithLine) {
-  change("station.yaml", "  rms_px: 0.014", "  rms_mm: 0.014");
-  EXPECT_THAT(rejection_message(), AllOf(HasSubstr("station.yaml:"), HasSubstr("rms_mm")));
-}
-
-TEST_F(ReadStationConfig, RejectsImplausibleValues) {
-  struct Implausible {
-    const char *message, *from, *to;
-  };
-  for (const auto& [message, from, to] :
-       {Implausible{"gates.coverage: should be a fraction from 0 to 1, not 7", "\n  coverage: 0.7",
-                    "\n  coverage: 7"},
-        {"gates.check_fix_fraction", "check_fix_fraction: 0.9", "check_fix_fraction: 1.9"},
-        {"gates.rms_px", "rms_px: 0.014", "rms_px: -0.014"},
-        {"completion.board_coverage", "board_coverage: 0.7", "board_coverage: 70"},
-        {"completion.board_views", "board_views: 36", "board_views: 0"},
-        {"completion.turn_captures", "turn_captures: 12", "turn_captures: 10001"},
-        {"completion.turn_arc_deg", "turn_arc_deg: 300", "turn_arc_deg: 361"},
-        {"completion.check_captures", "check_captures: 36", "check_captures: 3.6"},
-        {"rejection.blur_fraction", "{blur_fraction: 0.003", "{blur_fraction: 2"},
-        {"rejection.dark_fraction", "dark_fraction: 0.1", "dark_fraction: 1.1"},
-        {"rejection.same_pose_fraction", "same_pose_fraction: 0.01", "same_pose_fraction: -0.01"},
-        {"rejection.max_consecutive_rejections", "max_consecutive_rejections: 12",
-         "max_consecutive_rejections: 0"}}) {
-    const std::string before = TemporaryFolder::read_content(folder / "station.yaml");
-    change("station.yaml", from, to);
-    EXPECT_THAT(rejection_message(), HasSubstr(message)) << to;
-    folder.file("station.yaml", before);
-  }
-  EXPECT_NO_THROW(read_station_config(folder / "station.yaml"));
-
-  change("station.yaml", "\n  coverage: 0.7", "\n  coverage: 7");
-  EXPECT_THAT(rejection_message(),
-              HasSubstr("gates.coverage: should be a fraction from 0 to 1, not 7"));
-  change("station.yaml", "board_coverage: 0.7", "board_coverage: 70");
-  EXPECT_THAT(rejection_message(), HasSubstr("completion.board_coverage"));
-}
-
-TEST_F(ReadStationConfig, RejectsCameraTypeWithoutRowTime) {
-  change("camera_type.yaml", "  row_time_s: 3.0e-05\n", "");
-  EXPECT_THAT(rejection_message(), AllOf(HasSubstr("camera_type"), HasSubstr("row_time_s")));
-}
-
-TEST_F(ReadStationConfig, ReadsGuardBandsAndRejectsUnsuitableOnes) {
+TEST_F(ReadStationConfig, ReadsGuardBandsAndHook) {
   change("station.yaml", "\nrecords: records.db",
          "\nguard_bands: {k: 1.645, standard_uncertainties: {check_mean_mm: 0.02}}"
-         "\nrecords: records.db");
-  for (const Gate& gate : read_station_config(folder / "station.yaml").gates) {
+         "\nrecords: records.db\nhook: {command: [./label, --to, it's]}");
+  const StationConfig config = read_station_config(folder / "station.yaml");
+  for (const Gate& gate : config.gates) {
     ASSERT_EQ(gate.guard_band.has_value(), gate.metric == "check_mean_mm") << gate.metric;
     if (!gate.guard_band) continue;
     EXPECT_EQ(gate.guard_band->standard_uncertainty, 0.02);
     EXPECT_EQ(gate.guard_band->k, 1.645);
   }
-  const auto refused = [&](const std::string& from, const std::string& to) {
-    const std::string before = TemporaryFolder::read_content(folder / "station.yaml");
-    change("station.yaml", from, to);
-    const std::string why = rejection_message();
-    folder.file("station.yaml", before);
-    return why;
-  };
-  EXPECT_THAT(refused("k: 1.645, standard", "standard"), HasSubstr("guard_bands: key 'k'"));
-  EXPECT_THAT(refused("{check_mean_mm: 0.02}", "{check_offset_mm: 0.02}"),
-              HasSubstr("check_offset_mm"));
-  EXPECT_THAT(refused("{check_mean_mm: 0.02}", "{}"), HasSubstr("names no gate"));
-  EXPECT_THAT(refused("check_mean_mm: 0.02", "check_mean_mm: 0"), HasSubstr("above 0"));
-  EXPECT_THAT(refused("check_mean_mm: 0.02", "check_mean_mm: 0.62"),
-              AllOf(HasSubstr("standard_uncertainties.check_mean_mm"),
-                    HasSubstr("leaves no value within the gate")));
-  EXPECT_THAT(refused("check_mean_mm: 0.02", "check_lamp_inlier_fraction: 0.04"),
-              HasSubstr("leaves no value within the gate"));
-}
-
-TEST_F(ReadStationConfig, ReadsHookCommandAndTimeLimit) {
-  EXPECT_FALSE(read_station_config(folder / "station.yaml").hook);
-  change("station.yaml", "records: records.db",
-         "records: records.db\nhook: {command: [./label, --to, it's]}");
+  ASSERT_TRUE(config.hook);
+  EXPECT_THAT(config.hook->command,
+              testing::ElementsAre((folder / "./label").string(), "--to", "it's"));
+  EXPECT_EQ(config.hook->time_limit_s, 30);
+  change("station.yaml", "[./label, --to, it's]", "[label], time_limit_s: 0.5");
   const auto hook = read_station_config(folder / "station.yaml").hook;
   ASSERT_TRUE(hook);
-  EXPECT_THAT(hook->command, testing::ElementsAre((folder / "./label").string(), "--to", "it's"));
-  EXPECT_EQ(hook->time_limit_s, 30);
-  change("station.yaml", "[./label, --to, it's]", "[label], time_limit_s: 0.5");
-  EXPECT_THAT(read_station_config(folder / "station.yaml").hook->command,
-              testing::ElementsAre("label"));
-  EXPECT_EQ(read_station_config(folder / "station.yaml").hook->time_limit_s, 0.5);
-  change("station.yaml", "time_limit_s: 0.5", "time_limit_s: 0");
-  EXPECT_THAT(rejection_message(), HasSubstr("hook.time_limit_s: should be above 0"));
-  change("station.yaml", "[label], time_limit_s: 0", "[]");
-  EXPECT_THAT(rejection_message(),
-              HasSubstr("hook.command: should be a program and its arguments"));
+  EXPECT_THAT(hook->command, testing::ElementsAre("label"));
+  EXPECT_EQ(hook->time_limit_s, 0.5);
+}
+
+struct Refusal {
+  const char *file, *from, *to, *key;
+};
+
+constexpr const char* kRecords = "records: records.db";
+constexpr const char* kGolden =
+    "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}\n";
+
+/// Each change is rejected with file, line and key.
+TEST_F(ReadStationConfig, RejectsInvalidValues) {
+  folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
+  change("station.yaml", kRecords,
+         kGolden + std::string("guard_bands: {k: 2, standard_uncertainties: {check_mean_mm: 0.02}}"
+                               "\nhook: {command: [label], time_limit_s: 1}\n"
+                               "retention: {images_days: 90}\nverify_due: {hours: 24, units: 200}\n"
+                               "serial_pattern: 'SN'\nrecords: records.db"));
+  const StationConfig config = read_station_config(folder / "station.yaml");
+  ASSERT_TRUE(config.golden_unit);
+  EXPECT_EQ(config.verification_interval->hours, 24);
+  EXPECT_EQ(config.verification_interval->units, 200);
+  EXPECT_EQ(config.retention.images_days, 90);
+  EXPECT_FALSE(config.retention.results_days);
+  for (const auto& [file, from, to, key] : std::vector<Refusal>{
+           {"station.yaml", "rms_px: 0.014", "rms_mm: 0.014", "gates"},
+           {"station.yaml", "coverage: 0.7\n", "coverage: 7\n", "gates.coverage"},
+           {"station.yaml", "check_fix_fraction: 0.9", "check_fix_fraction: 1.9",
+            "gates.check_fix_fraction"},
+           {"station.yaml", "rms_px: 0.014", "rms_px: -0.014", "gates.rms_px"},
+           {"station.yaml", "board_coverage: 0.7", "board_coverage: 70",
+            "completion.board_coverage"},
+           {"station.yaml", "board_views: 36", "board_views: 0", "completion.board_views"},
+           {"station.yaml", "turn_captures: 12", "turn_captures: 10001",
+            "completion.turn_captures"},
+           {"station.yaml", "turn_arc_deg: 300", "turn_arc_deg: 361", "completion.turn_arc_deg"},
+           {"station.yaml", "check_captures: 36", "check_captures: 3.6",
+            "completion.check_captures"},
+           {"station.yaml", "{blur_fraction: 0.003", "{blur_fraction: 2",
+            "rejection.blur_fraction"},
+           {"station.yaml", "dark_fraction: 0.1", "dark_fraction: 1.1", "rejection.dark_fraction"},
+           {"station.yaml", "same_pose_fraction: 0.01", "same_pose_fraction: -0.01",
+            "rejection.same_pose_fraction"},
+           {"station.yaml", "max_consecutive_rejections: 12", "max_consecutive_rejections: 0",
+            "rejection.max_consecutive_rejections"},
+           {"station.yaml", "k: 2, ", "", "guard_bands"},
+           {"station.yaml", "{check_mean_mm: 0.02}", "{check_offset_mm: 0.02}",
+            "guard_bands.standard_uncertainties"},
+           {"station.yaml", "{check_mean_mm: 0.02}", "{}", "guard_bands.standard_uncertainties"},
+           {"station.yaml", "{check_mean_mm: 0.02}", "{check_mean_mm: 0}",
+            "guard_bands.standard_uncertainties.check_mean_mm"},
+           // No value is left within the gate.
+           {"station.yaml", "{check_mean_mm: 0.02}", "{check_mean_mm: 0.52}",
+            "guard_bands.standard_uncertainties.check_mean_mm"},
+           {"station.yaml", "{check_mean_mm: 0.02}", "{check_lamp_inlier_fraction: 0.04}",
+            "guard_bands.standard_uncertainties.check_lamp_inlier_fraction"},
+           {"station.yaml", "time_limit_s: 1", "time_limit_s: 0", "hook.time_limit_s"},
+           {"station.yaml", "[label]", "[]", "hook.command"},
+           {"station.yaml", "'SN'", "'SN-[0-9'", "serial_pattern"},
+           {"station.yaml", "{hours: 24, units: 200}", "{}", "verify_due"},
+           {"station.yaml", "hours: 24", "hours: 0", "verify_due"},
+           {"station.yaml", "images_days: 90", "images_days: 0", "retention.images_days"},
+           {"station.yaml", kRecords, "records: mysql://server/records", "records"}}) {
+    const std::string before = TemporaryFolder::read_content(folder / file);
+    change(file, from, to);
+    const std::string above = before.substr(0, before.find(from));
+    const auto line = 1 + std::count(above.begin(), above.end(), '\n');
+    EXPECT_THAT(rejection_message(),
+                HasSubstr(file + (":" + std::to_string(line)) + ": " + key + ": "))
+        << to;
+    folder.file(file, before);
+  }
+  // Keys of the station that need something elsewhere.
+  for (const auto& [file, from, to, key] :
+       std::vector<Refusal>{{"station.yaml", kGolden, "", "verify_due"},
+                            {"camera_type.yaml", "  row_time_s: 3.0e-05\n", "", "camera_type"},
+                            {"golden.yaml", "  row_time_s: 0.00003\n", "", "golden.calibration"}}) {
+    const std::string before = TemporaryFolder::read_content(folder / file);
+    change(file, from, to);
+    EXPECT_THAT(rejection_message(),
+                testing::ContainsRegex("station.yaml:[0-9]+: " + std::string(key) + ": "));
+    folder.file(file, before);
+  }
 }
 
 TEST_F(ReadStationConfig, SerialPatternRestrictsAcceptedSerials) {
@@ -174,8 +188,6 @@ TEST_F(ReadStationConfig, SerialPatternRestrictsAcceptedSerials) {
   EXPECT_EQ(describe_serial_number_problem(config, "SN-01234"),
             "'SN-01234' is not of the form SN-[0-9]{4}");
   EXPECT_THAT(describe_serial_number_problem(config, ""), HasSubstr("a camera's id has letters"));
-  change("station.yaml", "'SN-[0-9]{4}'", "'SN-[0-9'");
-  EXPECT_THAT(rejection_message(), HasSubstr("serial_pattern: is no regular expression"));
 }
 
 /// Nested repetitions can match in exponentially many combinations.
@@ -187,45 +199,6 @@ TEST(DescribeSerialNumberProblem, ReportsPatternWhoseComparisonIsTooSlow) {
               HasSubstr("serial_pattern: the comparison is too slow for"));
   config.serial_pattern = "[A-Za-z0-9_.-]{1,64}";
   EXPECT_EQ(describe_serial_number_problem(config, std::string(64, 'a')), "");
-}
-
-TEST_F(ReadStationConfig, RejectsVerifyDueWithoutGoldenUnitAndZeroLimits) {
-  change("station.yaml", "records: records.db",
-         "records: records.db\nretention: {images_days: 90}\nverify_due: {hours: 24, units: 200}");
-  EXPECT_THAT(rejection_message(), HasSubstr("verify_due: needs a golden unit"));
-  folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
-  change("station.yaml", "records: records.db",
-         "records: records.db\n"
-         "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
-  const StationConfig config = read_station_config(folder / "station.yaml");
-  EXPECT_EQ(config.verification_interval->hours, 24);
-  EXPECT_EQ(config.verification_interval->units, 200);
-  EXPECT_EQ(config.retention.images_days, 90);
-  EXPECT_FALSE(config.retention.results_days);
-  change("station.yaml", "{hours: 24, units: 200}", "{}");
-  EXPECT_THAT(rejection_message(), HasSubstr("verify_due: should have hours or units"));
-  change("station.yaml", "verify_due: {}", "verify_due: {hours: 0}");
-  EXPECT_THAT(rejection_message(), HasSubstr("verify_due: hours should be above 0"));
-  change("station.yaml", "verify_due: {hours: 0}", "verify_due: {}");
-  change("station.yaml", "images_days: 90", "images_days: 0");
-  EXPECT_THAT(rejection_message(), HasSubstr("verify_due"));
-  change("station.yaml", "verify_due: {}", "verify_due: {units: 1}");
-  EXPECT_THAT(rejection_message(), HasSubstr("retention.images_days"));
-}
-
-TEST_F(ReadStationConfig, RejectsGoldenCalibrationWithoutRowTime) {
-  folder.file("golden.yaml", TemporaryFolder::read_content(kExample + "calibration.yaml"));
-  change("station.yaml", "records: records.db",
-         "records: records.db\n"
-         "golden: {camera_id: g, calibration: golden.yaml, gates: {tilt_deg: 1}}");
-  EXPECT_TRUE(read_station_config(folder / "station.yaml").golden_unit);
-  change("golden.yaml", "  row_time_s: 0.00003\n", "");
-  EXPECT_THAT(rejection_message(), AllOf(HasSubstr("golden.calibration"), HasSubstr("row_time_s")));
-}
-
-TEST_F(ReadStationConfig, RejectsUnknownKindOfDatabase) {
-  change("station.yaml", "records: records.db", "records: mysql://server/records");
-  EXPECT_THAT(rejection_message(), AllOf(HasSubstr("records"), HasSubstr("postgresql://")));
 }
 
 TEST_F(ReadStationConfig, DigestChangesWithReferencedFile) {

@@ -118,16 +118,6 @@ TEST(CheckAuditTrail, DetectsEachChangeOfSqliteRecords) {
   check_forgeries([&] { return (folder / (std::to_string(++count) + ".db")).string(); });
 }
 
-TEST(CheckAuditTrail, DetectsEachChangeOfPostgresRecords) {
-  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
-  const PostgresServer server;
-  ASSERT_NE(server.uri(), "");
-  check_forgeries([&] {
-    run_database_client(server.uri(), kDropAll);
-    return server.uri();
-  });
-}
-
 /// An earlier last digest remains in the trail unless it is removed.
 TEST(CheckAuditTrail, AcceptsEarlierLastDigestAfterNewRun) {
   const TemporaryFolder folder;

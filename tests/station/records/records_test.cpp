@@ -5,18 +5,14 @@
 
 #include <gmock/gmock.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <filesystem>
-#include <future>
 #include <nlohmann/json.hpp>
-#include <thread>
 
 #include "station/records/record_tables.h"
 #include "station/records/run_record.h"
 #include "station/sample_records.h"
 #include "station/station_config.h"
-#include "support/child_process.h"
 #include "support/postgres_server.h"
 #include "support/rejection_message.h"
 #include "support/schema.h"
@@ -25,7 +21,6 @@
 namespace vlp {
 namespace {
 
-using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -167,30 +162,6 @@ void check_records(const std::string& where) {
   EXPECT_EQ(trail.entries, 7U + 6U) << "runs and events";
 }
 
-/// Two programs write at the same time; the first one also creates the tables.
-void check_two_writers(const std::string& where) {
-  constexpr int each = 25;
-  std::vector<pid_t> children;
-  for (int writer = 0; writer < 2; ++writer) {
-    children.push_back(start_child([&] {
-      Records records(where);
-      for (int i = 0; i < each; ++i) {
-        records.store_run(make_sample_record(numbered_run_id(100 * (writer + 1) + i),
-                                             writer == 0 ? "a" : "b", 0.1));
-      }
-    }));
-  }
-  EXPECT_TRUE(end_well(children));
-  Records records(where);
-  const auto runs = records.list_run_summaries({});
-  EXPECT_THAT(runs, SizeIs(2 * each));
-  const TrailCheck trail = records.check_records_by_audit_trail("");
-  EXPECT_THAT(trail.problems, IsEmpty());
-  EXPECT_EQ(trail.entries, 2U * each);
-  for (const RunSummary& run : runs)
-    EXPECT_THAT(records.find_run_by_id(run.run)->images, SizeIs(2));
-}
-
 /// Returns tables, their columns, the version and the metrics.
 std::string read_state(const std::string& where) {
   const bool is_server_address = where.starts_with("postgresql://");
@@ -253,20 +224,13 @@ TEST(Records, StoresAndFindsRunsInSqlite) {
   check_records((folder / "records.db").string());
 }
 
-TEST(Records, KeepsAllRunsOfTwoConcurrentWritersInSqlite) {
-  const TemporaryFolder folder;
-  check_two_writers((folder / "records.db").string());
-}
-
 TEST(Records, StoresAndFindsRunsInPostgres) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const PostgresServer server;
   ASSERT_NE(server.uri(), "");
-  check_two_writers(server.uri());
-  // A connection string without a parameter, as for psql.
-  EXPECT_THAT(Records(server.plain_uri()).list_run_summaries({}), SizeIs(50));
-  run_database_client(server.uri(), kDropAll);
   check_records(server.uri());
+  // A connection string without a parameter, as for psql.
+  EXPECT_THAT(Records(server.plain_uri()).list_run_summaries({}), Not(IsEmpty()));
 
   // The server closes the connection, as at a restart.
   Records records(server.uri());
@@ -275,46 +239,6 @@ TEST(Records, StoresAndFindsRunsInPostgres) {
                       "pg_backend_pid() AND backend_type = 'client backend';\n");
   records.store_run(make_sample_record(numbered_run_id(9), "c", 0.1));
   EXPECT_TRUE(records.find_run_by_id(numbered_run_id(9)));
-}
-
-/// A program that waited creates nothing in addition to what it finds, here a single table: indices
-/// of tables in use would lock out their users.
-TEST(Records, WaitsForOtherProgramCreatingTablesInPostgres) {
-  if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
-  const PostgresServer server;
-  ASSERT_NE(server.uri(), "");
-  const TemporaryFolder folder;
-  const auto begun = folder / "begun", go_on = folder / "go_on";
-  const std::string lock = std::to_string(kTableLockId);
-  auto another = std::async(std::launch::async, [&] {
-    run_database_client(server.uri(), "BEGIN;\nSELECT pg_advisory_xact_lock(" + lock +
-                                          ");\n\\! touch " + begun.string() + "; while [ ! -e " +
-                                          go_on.string() +
-                                          " ]; do sleep 0.01; done\n"
-                                          "CREATE TABLE vlp_schema (version INTEGER PRIMARY KEY);\n"
-                                          "INSERT INTO vlp_schema VALUES (" +
-                                          std::to_string(kSchemaVersion) + ");\nCOMMIT;\n");
-  });
-  const auto until = std::chrono::steady_clock::now() + std::chrono::seconds(20);
-  while (!std::filesystem::exists(begun) && std::chrono::steady_clock::now() < until) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
-  }
-  auto made = std::async(std::launch::async,
-                         [&] { return Records(server.uri()).list_run_summaries({}).size(); });
-  EXPECT_EQ(made.wait_for(std::chrono::milliseconds(500)), std::future_status::timeout);
-  folder.file("go_on", "");
-  another.get();
-  EXPECT_THAT(rejection_message([&] { made.get(); }),
-              HasSubstr("relation \"runs\" does not exist"));
-  EXPECT_THAT(run_database_client(server.uri(), "SELECT COUNT(to_regclass('runs'));"),
-              Not(HasSubstr("1")));
-}
-
-TEST(Records, ThrowsForFileThatIsNotDatabase) {
-  const TemporaryFolder folder;
-  const auto file = folder.file("records.db", std::string(5000, 'x'));
-  EXPECT_THAT(rejection_message([&] { Records records(file.string()); }),
-              testing::AllOf(HasSubstr("records.db"), HasSubstr("not a database")));
 }
 
 TEST(Records, ErrorsOmitPasswordOfServerAddress) {
@@ -332,16 +256,11 @@ TEST(Records, ErrorsOmitPasswordOfServerAddress) {
        {"postgresql://vlp@/postgres?secret", "mysql://vlp:secret@/records",
         // where libpq takes a part of the password for the host, the port or the database
         "postgresql://vlp:a@secret@/postgres", "postgresql://vlp:a/secret@nowhere/postgres",
-        "postgresql://vlp:secret/postgres"}) {
+        "postgresql://vlp:secret/postgres", "host=/nowhere user=vlp password=secret"}) {
     EXPECT_THAT(rejection_message([&] { Records records(where); }),
-                testing::AllOf(HasSubstr("://...: is not of the form postgresql://USER@HOST/NAME"),
+                testing::AllOf(HasSubstr("is not of the form postgresql://USER@HOST/NAME"),
                                Not(HasSubstr("secret"))));
   }
-}
-
-TEST(Records, ErrorsOmitPasswordOfKeywordConnectionString) {
-  EXPECT_THAT(rejection_message([&] { Records records("host=/nowhere user=vlp password=secret"); }),
-              AllOf(HasSubstr("is not of the form postgresql://"), Not(HasSubstr("secret"))));
 }
 
 /// Returns the first line of a text.
@@ -377,43 +296,6 @@ TEST(ExportRunsToFile, WritesMetricsAndSelectedTextsAsCsv) {
               HasSubstr(".csv"));
 }
 
-std::vector<std::string> list_keys(const nlohmann::ordered_json& json) {
-  std::vector<std::string> keys;
-  for (const auto& item : json.items()) keys.push_back(item.key());
-  return keys;
-}
-
-TEST(ExportRunsToFile, WritesMetricsImagesAndAllTextsAsJson) {
-  const TemporaryFolder folder;
-  const auto file = folder / "runs.json";
-  const RunRecord all = with_all_texts();
-  export_runs_to_file(file, {make_sample_record(numbered_run_id(1), "a", 0.25), all});
-  const auto runs = nlohmann::ordered_json::parse(TemporaryFolder::read_content(file));
-  ASSERT_THAT(runs, SizeIs(2));
-  EXPECT_THAT(list_keys(runs[0]),
-              ElementsAre("format", "run", "kind", "station", "camera", "operator_name", "shift",
-                          "begun_utc", "ended_utc", "verdict", "causes", "program", "libraries",
-                          "config_sha256", "calibration", "metrics", "images", "events"));
-  const auto& metrics = runs[0]["metrics"];
-  EXPECT_THAT(list_keys(metrics), ElementsAre("rms_px", "coverage", "tilt_deg"));
-  EXPECT_THAT(list_keys(metrics["tilt_deg"]),
-              ElementsAre("value", "unit", "gate", "at_least", "passed"));
-  EXPECT_THAT(list_keys(metrics["rms_px"]),
-              ElementsAre("value", "unit", "gate", "at_least", "passed", "uncertainty", "guard_k",
-                          "conformance_probability"));
-  EXPECT_NEAR(metrics["rms_px"]["conformance_probability"].get<double>(), 0.99379, 5e-6);
-  EXPECT_EQ(metrics["rms_px"]["value"], 0.25);
-  EXPECT_EQ(metrics["rms_px"]["unit"], "px");
-  EXPECT_TRUE(metrics["tilt_deg"]["value"].is_null());
-  EXPECT_TRUE(metrics["coverage"]["gate"].is_null());
-  EXPECT_THAT(list_keys(runs[0]["images"][1]), ElementsAre("step", "image", "sha256", "rejection"));
-  EXPECT_EQ(runs[0]["images"][1]["rejection"], "too dark");
-  for (const RunField& field : list_run_text_fields()) {
-    EXPECT_THAT(runs[1][field.name].get<std::string>(),
-                StartsWith(std::string("the '") + field.name + "' of "));
-  }
-}
-
 TEST(SerializeRun, DocumentsExportsAndHookMatchSchema) {
   const TemporaryFolder folder;
   RunRecord golden = make_sample_record(numbered_run_id(2), "b", 1.5);
@@ -434,6 +316,11 @@ TEST(SerializeRun, DocumentsExportsAndHookMatchSchema) {
     files.push_back(folder.file(name + "-exported.json", exported[i].dump()));
   }
   EXPECT_EQ(problems_by_schema("run", files), "");
+  const auto& metrics = exported[0]["metrics"];
+  EXPECT_EQ(metrics["rms_px"]["value"], 0.25);
+  EXPECT_NEAR(metrics["rms_px"]["conformance_probability"].get<double>(), 0.99379, 5e-6);
+  EXPECT_TRUE(metrics["tilt_deg"]["value"].is_null());
+  EXPECT_TRUE(metrics["coverage"]["gate"].is_null());
 }
 
 }  // namespace

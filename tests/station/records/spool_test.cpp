@@ -264,40 +264,6 @@ TEST(Spool, DeliversEachRunOnlyToItsOwnDatabase) {
   EXPECT_EQ(of_b.describe_spool_state(), "");
 }
 
-/// Runs `action` with another host name. Returns false if that is not possible.
-template <typename Action>
-bool on_another_machine(const Action& action) {
-  constexpr int not_permitted = 3;
-  const std::string name = "another";
-  const pid_t child = start_child([&] {
-    // The host name of this process only.
-    if (::unshare(CLONE_NEWUTS) != 0) ::_exit(not_permitted);
-    if (::sethostname(name.data(), name.size()) != 0) ::_exit(not_permitted);
-    action();
-  });
-  const int status = wait_for_child(child);
-  const bool permitted = WEXITSTATUS(status) != not_permitted;
-  EXPECT_TRUE(!permitted || status == 0);
-  return permitted;
-}
-
-/// Two machines that share the folder, with different records at the same path.
-TEST(Spool, LeavesRunsQueuedByAnotherMachineInSharedFolder) {
-  const TemporaryFolder folder;
-  const std::string where = (folder / "records.db").string();
-  { const Records made(where); }
-  const bool permitted =
-      on_another_machine([&] { Spool(folder / "spool", where).store_run(numbered_run(1)); });
-  if (!permitted) GTEST_SKIP() << "a process cannot have a machine's name of its own here";
-  Spool here(folder / "spool", where);
-  here.check_runs_can_be_stored();
-  EXPECT_THAT(whole_runs(where), IsEmpty());
-  EXPECT_EQ(here.describe_spool_state(), "1 queued for another database, such as another:" + where);
-  on_another_machine([&] { Spool(folder / "spool", where).deliver_waiting_runs(); });
-  EXPECT_THAT(whole_runs(where), SizeIs(1));
-  EXPECT_EQ(here.describe_spool_state(), "");
-}
-
 TEST(Spool, KeepsDifferentRunWithSameIdWaiting) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
@@ -334,11 +300,6 @@ TEST(Spool, CreatesDatabaseOnlyInCheckRunsCanBeStored) {
   EXPECT_FALSE(fs::exists(where));
   Spool(folder / "spool", where).check_runs_can_be_stored();
   EXPECT_THAT(whole_runs(where), SizeIs(1));
-}
-
-TEST(Spool, ConstructorThrowsForInvalidConnectionString) {
-  EXPECT_THAT(rejection_message([&] { Spool("spool", "postgresql://vlp:a@b@/c"); }),
-              HasSubstr("is not of the form"));
 }
 
 TEST(Spool, DeliversAllRunsOfConcurrentPrograms) {

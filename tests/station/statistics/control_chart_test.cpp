@@ -4,12 +4,10 @@
 
 #include <gmock/gmock.h>
 
-#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
 
-#include "support/random.h"
 #include "support/rejection_message.h"
 #include "support/temporary_folder.h"
 
@@ -46,15 +44,6 @@ std::vector<double> in_turns(std::size_t count, double size) {
 std::vector<double> with(std::vector<double> values, std::size_t place, double value) {
   values[place] = value;
   return values;
-}
-
-TEST(ComputeControlChart, LimitsAre3SigmaOfMovingRangeAroundMean) {
-  const ControlChart chart = compute_control_chart(std::vector<double>{1, 3, 2, 5});
-  const double sigma = (2 + 1 + 3) / 3.0 / 1.128, mean = 11 / 4.0;
-  EXPECT_DOUBLE_EQ(chart.mean, mean);
-  EXPECT_DOUBLE_EQ(chart.sigma, sigma);
-  EXPECT_DOUBLE_EQ(chart.upper, mean + 3 * sigma);
-  EXPECT_DOUBLE_EQ(chart.lower, mean - 3 * sigma);
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2: flow rates of ten batches.
@@ -120,41 +109,6 @@ TEST(ListControlChartRules, RulesMatchOnlyTheirPatternEndingAtLastValue) {
         << each.rule << testing::PrintToString(each.matches);
     EXPECT_FALSE(matches(each.rule, each.fails)) << each.rule << testing::PrintToString(each.fails);
   }
-}
-
-/// Mean values until the first false alarm, of known mean and sigma: Champ and Woodall 1987,
-/// Technometrics 29, 393-399, table 1.
-TEST(ListControlChartRules, MeanRunLengthsToFalseAlarmMatchPublishedOnes) {
-  const std::vector<std::pair<std::string, double>> published{
-      {"1", 370.40}, {"12", 225.44}, {"13", 166.05}, {"14", 152.73}, {"1234", 91.75}};
-  Random random(5);
-  for (const auto& [numbers, expected] : published) {
-    std::vector<ChartRule> rules;
-    for (const char number : numbers) {
-      rules.push_back(list_control_chart_rules()[static_cast<std::size_t>(number - '1')]);
-    }
-    constexpr int trials = 3000;
-    double total = 0;
-    for (int trial = 0; trial < trials; ++trial) {
-      std::vector<double> sigmas;
-      do {
-        sigmas.push_back(random.normal());
-      } while (std::none_of(rules.begin(), rules.end(),
-                            [&](const ChartRule& rule) { return rule.matches(sigmas); }));
-      total += static_cast<double>(sigmas.size());
-    }
-    // For an approximately geometric run length the standard error is 1.8 %.
-    EXPECT_NEAR(total / trials / expected, 1, 0.06) << numbers;
-  }
-}
-
-TEST(FindControlChartAlarms, ReportsValueBeyondThreeSigmas) {
-  std::vector<double> values;
-  for (int i = 0; i < 20; ++i) values.push_back(i % 2 == 0 ? 1.0 : 1.1);
-  values[13] = 3;
-  EXPECT_THAT(find_indices(find_control_chart_alarms(values, {"western-electric-1"})),
-              ElementsAre(13));
-  EXPECT_THAT(find_indices(find_control_chart_alarms(values, {"nelson-1"})), ElementsAre(13));
 }
 
 TEST(FindControlChartAlarms, ReportsShiftOfMeanInsideLimits) {

@@ -24,10 +24,6 @@ using testing::StartsWith;
 
 struct LampFaults : ExampleRig {};
 
-TEST_F(LampFaults, DescribeLampMapFaultsReturnsNoneForCorrectMap) {
-  EXPECT_THAT(describe_lamp_map_faults(frames, map, calibration), IsEmpty());
-}
-
 TEST_F(LampFaults, DescribeLampMapFaultsNamesSwappedLamps) {
   for (std::size_t a = 0; a < map.lamps.size(); ++a) {
     for (std::size_t b = a + 1; b < map.lamps.size(); ++b) {
@@ -63,18 +59,6 @@ TEST_F(LampFaults, DescribeMissingLampsNamesNeverVisibleLamp) {
       << "it does not contradict the map";
   EXPECT_THAT(describe_missing_lamps(std::span(frames).first(2), map), IsEmpty())
       << "too few to tell";
-}
-
-/// For a known camera.
-TEST_F(LampFaults, DescribeLampMapFaultsNames4MmDisplacementWithSmallLimit) {
-  constexpr double fits_px = 0.25;
-  EXPECT_THAT(describe_lamp_map_faults(frames, map, calibration, fits_px), IsEmpty());
-  for (std::size_t i = 0; i < map.lamps.size(); ++i) {
-    LampMap moved = map;
-    moved.lamps[i].position_m += Eigen::Vector3d(0.004, 0, 0);
-    EXPECT_THAT(describe_lamp_map_faults(frames, moved, calibration, fits_px),
-                ElementsAre(HasSubstr("lamp " + std::to_string(map.lamps[i].id) + " hangs ")));
-  }
 }
 
 /// A light that is mistaken for a lamp is rejected, and its capture has a large residual. That does
@@ -117,17 +101,6 @@ struct PlaceFault : LampFaults {
   }
   CapturesTable places;
 };
-
-TEST_F(PlaceFault, DescribeWrongReferencePositionsNamesSingleWrongCapture) {
-  EXPECT_EQ(describe_wrong_reference_positions(frames, map, calibration, places), "");
-  for (const std::size_t which : {std::size_t{0}, std::size_t{17}, frames.size() - 1}) {
-    CapturesTable wrong = places;
-    wrong.at(frames[which].image).y_m.value() += 0.02;
-    EXPECT_THAT(describe_wrong_reference_positions(frames, map, calibration, wrong),
-                testing::AllOf(testing::StartsWith(frames[which].image + " was not taken"),
-                               HasSubstr("20.0 mm, that of others 0.3 mm")));
-  }
-}
 
 TEST_F(PlaceFault, DescribeWrongReferencePositionsNamesSeveralWrongCaptures) {
   ASSERT_GT(frames.size(), 12U);

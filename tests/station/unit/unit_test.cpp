@@ -78,15 +78,6 @@ TEST_F(UnitTest, CanStillPassWhenOneImageOfBatchIsUsed) {
   EXPECT_TRUE(unit.can_no_longer_pass());
 }
 
-TEST_F(UnitTest, CanNoLongerPassIfAllImagesOfBatchAreRejected) {
-  std::vector<fs::path> together;
-  for (int i = 0; i < config.max_consecutive_rejections; ++i) {
-    together.push_back(folder.file(std::to_string(100 + i) + ".png", "no image"));
-  }
-  unit.add_step_images(StationStep::boards, together);
-  EXPECT_TRUE(unit.can_no_longer_pass());
-}
-
 TEST_F(UnitTest, VerdictIsInvalidWhenUnitIsEndedEarly) {
   unit.end_unit_before_completion("the operator ended the run");
   EXPECT_THAT(
