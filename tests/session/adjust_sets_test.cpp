@@ -68,18 +68,6 @@ TEST_F(RunJointAdjustmentStep, HasNoLeverArmWithoutPivots) {
   EXPECT_FALSE(find_metric_value(result.metrics, "lever_arm_mm"));
 }
 
-TEST_F(RunJointAdjustmentStep, CountsPositionsWithoutSd) {
-  AdjustStepInput input = make_input("1");
-  for (std::size_t i = 0; i < 3; ++i) {
-    Capture& capture = input.sets[1].captures[input.sets[1].frames[i].image];
-    capture.x_m = 0.25;
-    capture.y_m = -0.1;
-  }
-  EXPECT_THAT(
-      run_joint_adjustment_step(input, {}).warnings,
-      testing::Contains(testing::HasSubstr("set 1: the positions of 3 captures are ignored")));
-}
-
 TEST_F(RunJointAdjustmentStep, CapturesOfInPlaceRotationShareOnePivot) {
   AdjustStepInput input = make_input("");
   for (AdjustSet& set : input.sets) set.is_in_place_rotation = true;

@@ -33,13 +33,6 @@ TEST(DescribePositionErrorOutliers, NamesConsecutiveCapturesAsRanges) {
             "captures 100, 102, 103, 105, 107, 109 and 1 more groups");
 }
 
-TEST(DescribePositionErrorOutliers, EndsRangeAtCaptureMissingInList) {
-  auto errors = errors_with({0, 1, 2, 3, 4, 5});
-  errors.erase(errors.begin() + 3);
-  const std::string outliers = describe_position_error_outliers(errors);
-  EXPECT_EQ(outliers.substr(0, outliers.find(" have")), "captures 100 to 102, 104, 105");
-}
-
 TEST(DescribePositionErrorOutliers, ReturnsEmptyTextWithoutGrossOutliers) {
   EXPECT_EQ(describe_position_error_outliers(errors_with({})), "");
   auto errors = errors_with({});

@@ -104,16 +104,6 @@ TEST(EvaluateFixesAgainstTruth, WarnsOfMissingFixesThatNoGateLimits) {
   EXPECT_THAT(evaluate_fixes_against_truth(input, limited).warnings, IsEmpty());
 }
 
-TEST(EvaluateFixesAgainstTruth, NamesMostFrequentReasonWithoutFix) {
-  EvaluationInput input = make_evaluation_input(3, 0);
-  for (FixRow& row : input.fixes.rows) row.fix.reset();
-  input.fixes.rows[0].status = "too_few_lamps";
-  input.fixes.rows[1].status = input.fixes.rows[2].status = "degenerate";
-  const EvaluateResult result = evaluate_fixes_against_truth(input, {});
-  EXPECT_EQ(format_failure_message(result),
-            "folder/fixes.csv: none of 3 captures has a fix (2 of them: degenerate)");
-}
-
 TEST(ComputeSamePositionRadius, IsMillimeterPlusTwiceLengthOfLeverArm) {
   Calibration calibration{synthetic_camera(), {}, {}, {}, {}};
   EXPECT_DOUBLE_EQ(compute_same_position_radius_m(calibration), 0.001);
@@ -146,18 +136,6 @@ TEST_F(RenderEvaluationReportHtml, TitleIsNameOfCameraElseOfFixes) {
   EXPECT_EQ(find_title(), "Accuracy report: fixes.csv");
   page.calibration->camera.id = "unit-7";
   EXPECT_EQ(find_title(), "Accuracy report: unit-7");
-}
-
-TEST_F(RenderEvaluationReportHtml, ContainsErrorsNotesCautionAndProvenance) {
-  result.caution = "one capture is missing";
-  page.gates = check_gates({{"mean_mm", 2}}, result.metrics);
-  page.evaluation = HistoryEntry{"", "vlp-evaluate", "1.2", "", {}};
-  const std::string html = render();
-  for (const char* text : {"horizontal error, mean</th><td>", "one capture is missing",
-                           "Horizontal errors are distances from the true place",
-                           "Floor plan with the lamps", "evaluation: vlp-evaluate 1.2"}) {
-    EXPECT_NE(html.find(text), std::string::npos) << text;
-  }
 }
 
 TEST_F(RenderEvaluationReportHtml, ContainsPlotAndStatisticsOfEachDrive) {

@@ -145,25 +145,5 @@ INSTANTIATE_TEST_SUITE_P(Rooms, LocateCameraFromNoisyDetections,
                                          Case{"MapErrorsNotStated", 0.002, Noise::not_stated}),
                          [](const auto& one) { return one.param.name; });
 
-TEST(LocateCameraFromDetections, NotesThatSdFollowsResidualsAboveGivenNoise) {
-  SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
-  Random random(3);
-  LocateInput input{{}, rig.map, rig.calibration};
-  for (int k = 0; k < 12; ++k) {
-    rig.camera = {{0.05 * k - 0.3, 0, 0}, 0.5 * k};
-    input.frames.push_back({std::to_string(k), with_noise(seen_from(rig, kNoise_px), random)});
-    for (Detection& detection : input.frames.back().detections) detection.sigma_px = kNoise_px / 2;
-  }
-  const LocateResult found = locate_camera_from_detections(input);
-  ASSERT_TRUE(found.has_succeeded());
-  ASSERT_EQ(found.notes.size(), 1U);
-  EXPECT_NE(found.notes[0].find("times the stated noise: sd follows the residuals"),
-            std::string::npos)
-      << found.notes[0];
-  const auto ratio = find_metric_value(found.metrics, "residual_ratio");
-  ASSERT_TRUE(ratio);
-  EXPECT_NEAR(*ratio, 2, 0.3);
-}
-
 }  // namespace
 }  // namespace vlp

@@ -16,7 +16,6 @@ namespace {
 namespace fs = std::filesystem;
 using testing::Contains;
 using testing::HasSubstr;
-using testing::Not;
 
 class LocateCameraFromImages : public RenderedSession {
  protected:
@@ -55,20 +54,6 @@ TEST_F(LocateCameraFromImages, LocatesCameraOfEachImage) {
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_LT(find_largest_error_m(result, session_file("check")), 3e-4);
   EXPECT_EQ(result.observations.images.size(), 6U);
-}
-
-TEST_F(LocateCameraFromImages, ObservationsAreThoseOfFixesIfTiltIsEstimated) {
-  LocateInput input = make_input();
-  input.roll_pitch_sd_rad = 0.1;
-  const LocateResult result = locate("check", input);
-  ASSERT_TRUE(result.has_succeeded()) << result.message;
-  input.frames = collect_lamp_frames_of_kept_images(result.observations.images);
-  const LocateResult again = locate_camera_from_detections(input);
-  ASSERT_EQ(again.rows.size(), result.rows.size());
-  for (std::size_t i = 0; i < result.rows.size(); ++i) {
-    ASSERT_TRUE(result.rows[i].fix && again.rows[i].fix) << i;
-    EXPECT_EQ(again.rows[i].fix->pose.position_m, result.rows[i].fix->pose.position_m) << i;
-  }
 }
 
 TEST_F(LocateCameraFromImages, DetectionsAreThoseOfLibraryIfTiltIsEstimated) {
@@ -116,15 +101,6 @@ TEST_F(LocateCameraFromImages, FailsIfNoLampIsIdentified) {
   const LocateResult result = locate("check", input);
   EXPECT_FALSE(result.has_succeeded());
   EXPECT_THAT(result.rows, testing::IsEmpty());
-}
-
-TEST_F(LocateCameraFromImages, WarnsOfContradictedRowTimeWithNameOfCalibration) {
-  LocateInput input = make_input();
-  EXPECT_THAT(locate("check", input).warnings, Not(Contains(HasSubstr("row time is"))));
-  input.calibration.camera.row_time_s = 3.1e-5;
-  const LocateResult result = locate("rotation", input);
-  ASSERT_TRUE(result.has_succeeded()) << result.message;
-  EXPECT_THAT(result.warnings, Contains(HasSubstr("row time is 31 us in camera.yaml")));
 }
 
 TEST_F(LocateCameraFromImages, WritesAnnotatedImagesOnRequest) {

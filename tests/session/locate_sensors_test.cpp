@@ -46,6 +46,15 @@ TEST(MakeCaptureSensorReadings, ReadsTimeMotionAndInclinationOfTable) {
   EXPECT_EQ(sensors.inclination_sigma_rad, 0.1);
   EXPECT_EQ(sensors.motion->yaw_rate_rad_per_s, 0.5);
   EXPECT_EQ(sensors.motion->yaw_rate_sd_rad_per_s, 0.03);
+  input.motion = KnownMotion::make_motion_prior_from_limits(3, 2);
+  capture.yaw_rate_rad_per_s.reset();
+  capture.velocity_m_per_s = Eigen::Vector2d(0.5, -0.2);
+  capture.velocity_sd_m_per_s = 0.05;
+  const Sensors moving = make_capture_sensor_readings("a", input);
+  ASSERT_TRUE(moving.motion);
+  EXPECT_EQ(moving.motion->velocity_m_per_s, Eigen::Vector2d(0.5, -0.2));
+  EXPECT_EQ(moving.motion->velocity_sd_m_per_s, 0.05);
+  EXPECT_EQ(moving.motion->yaw_rate_sd_rad_per_s, input.motion->yaw_rate_sd_rad_per_s);
 }
 
 TEST(MakeCaptureSensorReadings, UsesHeightAndYawOnlyIfRequested) {

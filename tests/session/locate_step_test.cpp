@@ -33,52 +33,12 @@ TEST(LocateCameraFromDetections, ReturnsFixForEachFrameOfExample) {
   EXPECT_THAT(found.rejected_lamps, IsEmpty());
 }
 
-TEST(LocateCameraFromDetections, CountsCapturesWithRejectedLamps) {
-  LocateInput input = example();
-  int moved = 0;
-  for (Frame& frame : input.frames) {
-    if (frame.detections.size() < 5 || moved == 3) continue;
-    frame.detections.front().pixel.x() += 60;
-    ++moved;
-  }
-  ASSERT_EQ(moved, 3);
-  const LocateResult found = locate_camera_from_detections(input);
-  int captures = 0;
-  for (const auto& [lamp, count] : found.rejected_lamps) captures += count;
-  EXPECT_EQ(captures, 3);
-  EXPECT_THAT(found.warnings,
-              testing::Contains(HasSubstr("3 detections that contradict the others")));
-}
-
 TEST(LocateCameraFromDetections, CountsDetectionsOfLampsMissingInMap) {
   LocateInput input = example();
   ASSERT_GT(input.frames.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i) input.frames[i].detections.push_back({99, {400, 300}, 0.05});
   EXPECT_THAT(locate_camera_from_detections(input).warnings,
               ElementsAre("2 detections of lamps not in the map, rejected"));
-}
-
-/// Input with captures of a camera that drives at 1 m/s, about which nothing is stated.
-LocateInput drive_without_stated_motion(double sigma_px) {
-  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
-  LocateInput input{{}, rig.map, rig.calibration};
-  for (int i = 0; i < 12; ++i) {
-    rig.body.pose = {{0.05 * i - 0.3, -0.02 * i, 0}, 0.5 * i};
-    rig.body.motion = {{0.6, -0.8}, 0, {0, 0}};
-    input.frames.push_back({std::to_string(i), seen_from(rig, sigma_px)});
-  }
-  return input;
-}
-
-TEST(LocateCameraFromDetections, WarnsOfMovingCameraUnlessMotionIsGiven) {
-  LocateInput input = drive_without_stated_motion(0.02);
-  const LocateResult found = locate_camera_from_detections(input);
-  EXPECT_THAT(found.warnings,
-              testing::Contains(HasSubstr("the images fit a moving camera, at 1 m/s: state "
-                                          "velocities in captures.csv, or --max-speed-m-per-s")));
-  input.motion = KnownMotion::make_motion_prior_from_limits(3, 0);
-  EXPECT_THAT(locate_camera_from_detections(input).warnings,
-              Not(testing::Contains(HasSubstr("moves"))));
 }
 
 TEST(LocateCameraFromDetections, WarnsOfTiltedCameraUnlessTiltIsEstimated) {
@@ -95,18 +55,6 @@ TEST(LocateCameraFromDetections, WarnsOfTiltedCameraUnlessTiltIsEstimated) {
   EXPECT_THAT(locate_camera_from_detections(input).warnings, testing::Contains(warning));
   input.roll_pitch_sd_rad = 0.1;
   EXPECT_THAT(locate_camera_from_detections(input).warnings, Not(testing::Contains(warning)));
-}
-
-TEST(LocateCameraFromDetections, DoesNotWarnOfMotionWhenStandingWithMovedLamp) {
-  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
-  LocateInput input{{}, rig.map, rig.calibration};
-  input.lamps.lamps.front().position_m.x() += 0.02;
-  for (int i = 0; i < 12; ++i) {
-    rig.body.pose = {{0.05 * i - 0.3, -0.02 * i, 0}, 0.5 * i};
-    input.frames.push_back({std::to_string(i), seen_from(rig, 0.02)});
-  }
-  EXPECT_THAT(locate_camera_from_detections(input).warnings,
-              Not(testing::Contains(HasSubstr("moves"))));
 }
 
 TEST(LocateCameraFromDetections, LampOffsetsEqualDisplacementOfMovedLamp) {
@@ -203,32 +151,6 @@ TEST(LocateCameraFromDetections, RollOfCapturesTableMovesFixAlongY) {
                                                           " images are not in captures.csv")));
 }
 
-TEST(LocateCameraFromDetections, WarnsOfLampsOutsideValidRegionOfLens) {
-  LocateInput input = example();
-  IntrinsicsReport& report = input.calibration.intrinsics_report.emplace();
-  report.region_px = {{-1e4, -1e4}, {1e4, -1e4}, {1e4, 1e4}, {-1e4, 1e4}};
-  EXPECT_THAT(locate_camera_from_detections(input).warnings, IsEmpty());
-  const double right_px = input.frames[0].detections[0].pixel.x() - 1;
-  report.region_px = {{-1e4, -1e4}, {right_px, -1e4}, {right_px, 1e4}, {-1e4, 1e4}};
-  const LocateResult marked = locate_camera_from_detections(input);
-  EXPECT_THAT(marked.warnings,
-              ElementsAre(HasSubstr("fixes use lamps outside the valid region of the lens")));
-  for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    if (!marked.rows[i].fix) continue;
-    std::vector<int> beyond;
-    for (const Detection& one : input.frames[i].detections) {
-      if (one.pixel.x() > right_px) beyond.push_back(one.lamp);
-    }
-    EXPECT_EQ(marked.rows[i].lamps_outside_region, beyond);
-    if (beyond.empty()) continue;
-    const std::string counts =
-        std::to_string(beyond.size()) + " of " + std::to_string(input.frames[i].detections.size());
-    EXPECT_THAT(marked.details,
-                testing::Contains(input.frames[i].image + ": " + counts +
-                                  " lamps are outside the valid region of the lens"));
-  }
-}
-
 TEST(LocateCameraFromDetections, ReturnsUndeterminedIfNoFrameHasFix) {
   LocateInput input = example();
   for (Frame& frame : input.frames) frame.detections.resize(1);
@@ -286,19 +208,6 @@ TEST(LocateCameraFromDetections, LocatesMovingCameraExactlyWithOdometry) {
   EXPECT_NEAR(locate_camera_from_detections(input).rows[0].fix->velocity_m_per_s->x(), 1, 1e-9);
 }
 
-TEST(LocateCameraFromDetections, WindowOfTwoFramesReducesHeightErrorWithTwoLamps) {
-  LocateInput input = drive(1);
-  for (Frame& frame : input.frames) frame.detections.resize(2);
-  input.motion = KnownMotion::make_motion_prior_from_limits(2, 0);
-  const double alone_m = worst_error_m(input, 1);
-  const double alone_sd_m = (*locate_camera_from_detections(input).rows[2].fix->sd)[2];
-  input.window_size = 2;
-  const LocateResult found = locate_camera_from_detections(input);
-  EXPECT_GT(alone_m, 1e-3);
-  EXPECT_LT(std::abs(found.rows[2].fix->pose.position_m.z()), 1e-4);
-  EXPECT_LT((*found.rows[2].fix->sd)[2], 0.2 * alone_sd_m);
-}
-
 TEST(LocateCameraFromDetections, WindowOfTwoUsesLatestEarlierFrameWithTime) {
   LocateInput input = drive(1);
   for (Frame& frame : input.frames) frame.detections.resize(2);
@@ -340,21 +249,6 @@ TEST(LocateCameraFromDetections, EstimatesTrueTiltWithoutInclinationSensor) {
   EXPECT_LT(found.rows[0].fix->pose.position_m.norm(), 1e-5);
   EXPECT_NEAR(found.rows[0].fix->inclination->roll_rad, 0.1, 1e-5);
   EXPECT_NEAR(found.rows[0].fix->inclination->pitch_rad, -0.08, 1e-5);
-}
-
-std::size_t far_outside(double u_px, double v_px) {
-  const Detection detection{1, {u_px, v_px}, {}};
-  return count_detections_outside_image(
-      std::array{Frame{"a", {detection, detection}}, Frame{"b", {}}}, {800, 600});
-}
-
-TEST(CountDetectionsOutsideImage, CountsOnlyDetectionsBeyondTenPercentOfImageSize) {
-  for (const auto& [u_px, v_px] : {std::pair(400, 300), {-79, 300}, {879, 300}, {400, -59}}) {
-    EXPECT_EQ(far_outside(u_px, v_px), 0) << u_px << " " << v_px;
-  }
-  for (const auto& [u_px, v_px] : {std::pair(-81, 300), {881, 300}, {400, -61}, {400, 661}}) {
-    EXPECT_EQ(far_outside(u_px, v_px), 2) << u_px << " " << v_px;
-  }
 }
 
 }  // namespace

@@ -112,14 +112,6 @@ TEST_F(MovedLamp, AllStepsNameLampAndDisplacementOnce) {
   }
 }
 
-TEST_F(MovedLamp, DispersionStepRejectsMovedLampAndNamesIt) {
-  take_captures({0.03, 0});
-  const StepResult result = disperse();
-  EXPECT_TRUE(result.has_succeeded()) << format_failure_message(result);
-  EXPECT_THAT(collect_lines(result),
-              Contains(HasSubstr("lamp 2 hangs 30 mm from where the map has it")));
-}
-
 TEST_F(MovedLamp, NoStepWarnsOfLampWhenMapIsCorrect) {
   take_captures({0, 0});
   for (const StepResult& result : {rotate(), disperse(), level(), locate(), adjust()}) {

@@ -129,23 +129,6 @@ TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenOtherMisplac
   images.expect_true_row_time(false);
 }
 
-TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeForTiltedCamera) {
-  Images images(mixed_rows());
-  for (int k = 0; k < 5; ++k) images.add({2, 3, 4, 5, 6}, k, {0.3, -0.2});
-  images.expect_true_row_time();
-}
-
-/// Each image shows three lamps.
-TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeFromImagesOfThreeLamps) {
-  Images images(mixed_rows());
-  for (int k = 0; k < 3; ++k) {
-    images.add({2, 3, 4}, k);
-    images.add({3, 4, 6}, k);
-    images.add({4, 5, 6}, k);
-  }
-  images.expect_true_row_time(true);
-}
-
 TEST(ComputePositionCostsOfRowTimeCandidates, IsZeroForImagesOfTwoLamps) {
   Images images(mixed_rows());
   for (int k = 0; k < 5; ++k) {
@@ -163,15 +146,6 @@ TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenLampMoved) {
   for (int k = 0; k < 5; ++k) images.add({2, 3, 4, 5, 6}, k, {0.02, 0}, moved);
   images.expect_true_row_time(true);
   images.expect_true_row_time(false);
-}
-
-/// A light between the lamps that has the period of the lamp that is not lit.
-TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeDespiteForeignLight) {
-  Images images(mixed_rows());
-  LampMap other = images.map;
-  other.lamps[5].position_m = {-0.2, 0.1, 1.6};
-  for (int k = 0; k < 5; ++k) images.add({2, 3, 4, 5, 6}, k, {0.02, 0}, other);
-  images.expect_true_row_time();
 }
 
 /// Around a circle each assignment is a turn of the other.

@@ -9,7 +9,6 @@
 #include "calibration/adjustment/survey.h"
 #include "rig/calibration_error.h"
 #include "support/body_rig.h"
-#include "support/joint_covariance.h"
 #include "support/matchers.h"
 
 namespace vlp {
@@ -134,31 +133,6 @@ TEST(RunRotationCalibrationStep, WarnsIfThreeCapturesLeaveNoStandardDeviation) {
   }
 }
 
-TEST(RunRotationCalibrationStep, JointCovarianceHasLensOnlyWithLensCovariance) {
-  RotatingCamera camera;
-  for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
-  const auto list_parameters = [&] {
-    return camera.calibrate().calibration.covariance.value().parameters;
-  };
-  const std::vector<std::string> without_lens{"zenith_x", "zenith_y", "lever_arm_x_m",
-                                              "lever_arm_y_m"};
-  EXPECT_EQ(list_parameters(), without_lens);
-  IntrinsicsReport& report = camera.captures.calibration.intrinsics_report.emplace();
-  EXPECT_EQ(list_parameters(), without_lens);
-  report.covariance = lens_covariance(camera.captures.calibration.camera, 0.1, 8);
-  const RotationResult result = camera.calibrate();
-  EXPECT_THAT(result.warnings, IsEmpty());
-  ASSERT_TRUE(result.calibration.covariance);
-  const JointCovariance& joint = *result.calibration.covariance;
-  const Eigen::Index count = report.covariance->rows();
-  ASSERT_EQ(joint.matrix.rows(), count + 4);
-  EXPECT_THAT(joint.matrix.topLeftCorner(count, count), IsNear(*report.covariance, 1e-12));
-  // A shift of the principal point moves the zenith by about -1 / f.
-  const MatrixX jacobian = derivative_by_lens(joint, kZenithParameter, count);
-  EXPECT_NEAR(jacobian(0, 2), -1 / camera.captures.calibration.camera.focal_px().x(), 4e-4);
-  EXPECT_NEAR(jacobian(1, 2), 0, 4e-4);
-}
-
 TEST(RunRotationCalibrationStep, FailsIfCapturesAreNoRotationInPlace) {
   RotatingCamera camera;
   for (int i = 0; i < 8; ++i) camera.survey.stand({{0.1 * i - 0.4, 0.05 * (i % 3), 0}, 0.7 * i});
@@ -268,12 +242,6 @@ TEST(RunTiltCalibrationStep, ReturnsUndeterminedForCapturesOfSingleLamp) {
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_FALSE(result.message.empty());
   EXPECT_FALSE(result.calibration.rotation_center);
-}
-
-TEST(FormatHeight, HasMillimetersAndNoNegativeZero) {
-  EXPECT_EQ(format_height_m(0.25), "0.250");
-  EXPECT_EQ(format_height_m(-0.0123), "-0.012");
-  EXPECT_EQ(format_height_m(-0.0001), "0.000");
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 
 #include "lamps/signal/frequency_identification.h"
 #include "support/datasets.h"
-#include "support/random.h"
 
 namespace vlp {
 namespace {
@@ -70,25 +69,6 @@ TEST(CheckRowTimeAgainstLamps, ReportsMeasuredRowTimeWhenGivenIs5PercentOff) {
   EXPECT_NEAR(*find_metric_value(metrics, "row_time_sd_us"), 0.01, 0.005);
   ASSERT_TRUE(find_metric_value(metrics, "row_time_error_percent"));
   EXPECT_NEAR(*find_metric_value(metrics, "row_time_error_percent"), 5, 0.2);
-}
-
-TEST(CheckRowTimeAgainstLamps, ReportsNoErrorForFrequenciesWithinLampDrift) {
-  const LampMap map = make_map();
-  Random random(1);
-  constexpr int trials = 500;
-  int measured = 0;
-  for (int trial = 0; trial < trials; ++trial) {
-    std::vector<double> deviations(map.lamps.size());
-    // Independent deviations, and, in each second trial, one of all lamps.
-    for (double& deviation : deviations) deviation = kLampDrift * random.uniform(-1, 1);
-    if (trial % 2 == 0) deviations.assign(map.lamps.size(), kLampDrift * (trial % 4 == 0 ? 1 : -1));
-    const std::vector<Observation> images(4, observe(map, deviations, true));
-    const RowTimeCheck check =
-        check_row_time_against_lamps(images, map, {kTrueRowTime_s, "camera_type.yaml"});
-    measured += check.measured ? 1 : 0;
-    EXPECT_EQ(check.error, "") << trial;
-  }
-  EXPECT_EQ(measured, trials);
 }
 
 TEST(CheckRowTimeAgainstLamps, MeasuresNoRowTimeFromTwoLamps) {
@@ -219,21 +199,6 @@ TEST(EstimateRowTimeFromLights, IsUndeterminedWithoutLights) {
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_FALSE(result.message.empty());
   EXPECT_TRUE(result.metrics.empty());
-}
-
-TEST(DetectLightsInFolders, UsesCameraOfCalibrationWithOrWithoutItsRowTime) {
-  const LampMap lamps = read_lamp_map(kRig + "/lamps.yaml");
-  const Calibration calibration = read_calibration(kRig + "/true_calibration.yaml");
-  ASSERT_TRUE(calibration.camera.row_time_s);
-  for (const bool with_row_time : {true, false}) {
-    const DetectedLights seen =
-        detect_lights_in_folders({kRig + "/sample"}, lamps, calibration, with_row_time, {});
-    EXPECT_TRUE(seen.camera.lens);
-    EXPECT_EQ(seen.camera.readout, calibration.camera.readout);
-    EXPECT_EQ(seen.camera.row_time_s, with_row_time ? calibration.camera.row_time_s : std::nullopt);
-    ASSERT_EQ(seen.observations.images.size(), 2U);
-    EXPECT_EQ(seen.observations.images[0].size_px, calibration.camera.imager_px);
-  }
 }
 
 TEST(EstimateRowTimeFromLights, StoresRowTimeAndReadoutInCalibration) {

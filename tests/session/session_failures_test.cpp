@@ -198,27 +198,6 @@ TEST_F(RunCalibrationSession, WarnsOfRowTimeThatFailsGate) {
   }
 }
 
-TEST_F(RunCalibrationSession, MessagesDoNotContainPathOfSession) {
-  write_session_file("rotation/0002.png", "no image");
-  write_session_file("dispersion/0009.png", "no image");
-  options.report = true;
-  const SessionResult result = run();
-  for (const SessionStep& step : result.steps) {
-    for (const std::string& warning : step.result.warnings) {
-      EXPECT_THAT(warning, Not(HasSubstr(session_folder.string()))) << step.name;
-    }
-    for (const auto& [image, reason] : step.result.skipped) {
-      EXPECT_THAT(reason, Not(HasSubstr(session_folder.string()))) << step.name;
-    }
-  }
-  ASSERT_EQ(find_step(result, "rotation").result.skipped.size(), 1U);
-  EXPECT_EQ(find_step(result, "rotation").result.skipped[0].image, "0002.png");
-  ASSERT_EQ(find_step(result, "dispersion").result.skipped.size(), 1U);
-  EXPECT_THAT(find_step(result, "dispersion").result.skipped[0].reason,
-              HasSubstr("cannot be read as an image"));
-  EXPECT_THAT(read_result("session.json"), Not(HasSubstr(session_folder.string())));
-}
-
 TEST_F(RunCalibrationSession, RemovesPathOfSessionOnlyAtBeginningOfFileName) {
   fs::remove(session_file("dispersion/truth.csv"));
   const std::string path = session_file("a.png").string();

@@ -87,6 +87,10 @@ TEST(FormatSessionJson, ContainsLensSdsOnlyWithLensCovariance) {
     return nlohmann::json::parse(format_session_json(result, {}))["calibration"];
   };
   EXPECT_EQ(format_calibration()["focal_px"][0], synthetic_camera().focal_px().x());
+  EXPECT_EQ(format_calibration()["principal_point_px"][1],
+            synthetic_camera().principal_point_px().y());
+  result.calibration->camera.row_time_s = 3e-5;
+  EXPECT_EQ(format_calibration()["row_time_s"], 3e-5);
   EXPECT_FALSE(format_calibration().contains("focal_sd_px"));
   IntrinsicsReport report{40, 4000, 0, 0.1, {}, {}};
   result.calibration->intrinsics_report = report;
@@ -115,27 +119,6 @@ TEST(FormatSessionJson, StatesRotationCenterAndDispersionInMillimetersAndDegrees
   EXPECT_NEAR(json.at("lever_arm_sd_mm")[0], 0.1, 1e-12);
   EXPECT_NEAR(json.at("lever_arm_sd_mm")[1], 0.2, 1e-12);
   EXPECT_EQ(json.at("dispersion_offset_px"), nlohmann::json({0.4, -0.3}));
-}
-
-TEST(FormatSessionJson, StatesFocalLengthsPrincipalPointAndRowTime) {
-  SessionResult result;
-  Calibration& calibration =
-      result.calibration.emplace(Calibration{synthetic_camera(), {}, {}, {}, {}});
-  calibration.camera.id = "unit-7";
-  calibration.camera.intrinsics[0] = 501;
-  calibration.camera.intrinsics[1] = 502;
-  calibration.camera.intrinsics[2] = 403;
-  calibration.camera.intrinsics[3] = 304;
-  calibration.camera.row_time_s.reset();
-  auto json = nlohmann::json::parse(format_session_json(result, {}));
-  EXPECT_EQ(json["camera"], "unit-7");
-  EXPECT_EQ(json["calibration"]["focal_px"], nlohmann::json({501.0, 502.0}));
-  EXPECT_EQ(json["calibration"]["principal_point_px"], nlohmann::json({403.0, 304.0}));
-  EXPECT_EQ(json["calibration"]["lens_model"], lens_model_name(calibration.camera.lens_model));
-  EXPECT_FALSE(json["calibration"].contains("row_time_s"));
-  calibration.camera.row_time_s = 3e-5;
-  json = nlohmann::json::parse(format_session_json(result, {}));
-  EXPECT_EQ(json["calibration"]["row_time_s"], 3e-5);
 }
 
 TEST(FormatSessionJson, StatesStandardDeviationsOfZenithAndOffset) {
@@ -271,15 +254,6 @@ TEST(FormatSessionJunitXml, StatesReasonIfThereIsNoStep) {
   EXPECT_THAT(text, testing::HasSubstr("tests=\"1\""));
   EXPECT_THAT(text,
               testing::HasSubstr("<error type=\"bad_input\" message=\"lamps.yaml: is missing"));
-}
-
-TEST(StepFailureFromName, InvertsStepFailureNameForEachValue) {
-  for (const auto failure :
-       {StepFailure::none, StepFailure::bad_input, StepFailure::undetermined,
-        StepFailure::wrong_board, StepFailure::wrong_map, StepFailure::wrong_place}) {
-    EXPECT_EQ(step_failure_from_name(step_failure_name(failure)), failure);
-  }
-  EXPECT_FALSE(step_failure_from_name("odd"));
 }
 
 }  // namespace

@@ -42,17 +42,6 @@ TEST(ReadCapturesWithTruth, NamesLineOfInvalidTable) {
               HasSubstr("captures.csv:3"));
 }
 
-TEST(FindTruthFile, PrefersTruthTableToCapturesTableWithPositions) {
-  const TemporaryFolder folder;
-  EXPECT_FALSE(find_truth_file(folder / ""));
-  folder.file("captures.csv", "image,time_s\na.png,1\n");
-  EXPECT_FALSE(find_truth_file(folder / "")) << "captures.csv tells no place";
-  folder.file("captures.csv", "image,x_m,y_m\na.png,1,2\n");
-  EXPECT_EQ(find_truth_file(folder / "")->filename(), "captures.csv");
-  folder.file("truth.csv", "image,x_m,y_m\na.png,1,2\n");
-  EXPECT_EQ(find_truth_file(folder / "")->filename(), "truth.csv");
-}
-
 TEST(ReadTruthPositions, ReadsPositionsOfTruthElseOfCapturesTable) {
   const TemporaryFolder folder;
   folder.file("captures.csv", "image,x_m,y_m\nb.png,3,4\na.png,1,2\nc.png,,\n");
@@ -104,16 +93,6 @@ TEST(SessionFolder, FoldersOfDrivesAlongLinesAreThoseWithPositions) {
   EXPECT_FALSE(is_session_or_captures_folder(folder / "unit", folder / "unit/results"));
   fs::create_directories(folder / "unit/results");
   EXPECT_FALSE(is_session_or_captures_folder(folder / "unit", folder / "unit/results"));
-}
-
-TEST(FindEndPointsOfDrive, ReturnsFirstAndLastPosition) {
-  const std::vector<TruthRow> drive{
-      {"a", {0, 1}, {}, {}}, {"b", {2, 1}, {}, {}}, {"c", {3, 1}, {}, {}}};
-  EXPECT_EQ(find_end_points_of_drive("t.csv", drive)[1].x(), 3);
-  EXPECT_THAT(rejection_message([&] {
-                find_end_points_of_drive("t.csv", {drive[0], drive[0]});
-              }),
-              HasSubstr("t.csv: start and end of the drive are equal"));
 }
 
 }  // namespace

@@ -29,32 +29,6 @@ class SessionResultsTest : public testing::Test {
   const fs::path results = folder / "results", session = folder / "session";
 };
 
-TEST_F(SessionResultsTest, ReturnsCachedResultOnlyForUnchangedKeyAndOutputs) {
-  SessionResults cached_result(results, session);
-  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key of the lens"));
-  keep_two_steps(cached_result);
-  EXPECT_TRUE(cached_result.find_cached_step_result("lens", "key of the lens"));
-  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "another key"));
-  folder.file("results/lens.yaml", "changed");
-  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key of the lens"));
-  EXPECT_TRUE(cached_result.find_cached_step_result("rotation", "key of the rotation"));
-  fs::remove(results / "rotated.yaml");
-  EXPECT_FALSE(cached_result.find_cached_step_result("rotation", "key of the rotation"));
-}
-
-TEST_F(SessionResultsTest, CachesUndeterminedResultButNotBadInput) {
-  SessionResults cached_result(results, session);
-  cached_result.set_steps(kPlan);
-  StepResult bad, undetermined;
-  bad.set_step_failure(StepFailure::bad_input, "cut");
-  undetermined.set_step_failure(StepFailure::undetermined, "too few");
-  cached_result.store_step_result("lens", "key", bad);
-  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key"));
-  cached_result.store_step_result("lens", "key", undetermined);
-  ASSERT_TRUE(cached_result.find_cached_step_result("lens", "key"));
-  EXPECT_EQ(cached_result.find_cached_step_result("lens", "key")->message, "too few");
-}
-
 TEST_F(SessionResultsTest, KeepsOutputsOfLastRunUntilThoseOfThisRunArePublished) {
   {
     SessionResults before(results, session);
@@ -96,28 +70,6 @@ TEST_F(SessionResultsTest, WriteRefusalJunitXmlReplacesThatOfAnySession) {
   fs::create_directories(results / "boards");
   write_refusal_junit_xml(results, session, "refused");
   EXPECT_FALSE(fs::exists(results / "junit.xml")) << "no results";
-}
-
-TEST_F(SessionResultsTest, PublishOutputsRemovesOutputsOfStepsNotPlanned) {
-  {
-    SessionResults before(results, session);
-    keep_two_steps(before);
-    std::vector<StepOutputs> with_drive = kPlan;
-    with_drive.push_back({"line-x", {"line-x-fixes.csv"}});
-    before.set_steps(with_drive);
-    folder.file("results/line-x-fixes.csv", "of a drive");
-    before.store_step_result("line-x", "key", StepResult());
-    folder.file("results/mine.txt", "of somebody");
-  }
-  SessionResults now(results, session);
-  now.set_steps({{"lens", {"lens.yaml"}}});
-  now.publish_outputs();
-  EXPECT_TRUE(now.find_cached_step_result("lens", "key of the lens"));
-  EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
-  EXPECT_FALSE(fs::exists(results / "steps/rotation.json"));
-  EXPECT_FALSE(fs::exists(results / "line-x-fixes.csv"));
-  EXPECT_FALSE(fs::exists(results / "steps/line-x.json"));
-  EXPECT_TRUE(fs::exists(results / "mine.txt"));
 }
 
 TEST_F(SessionResultsTest, KeepsForeignFilesAndRejectsThemAsOutputs) {
@@ -220,19 +172,6 @@ TEST_F(SessionResultsTest, RejectsSymbolicLinkInPlaceOfOutput) {
   EXPECT_THAT([&] { taken.set_steps(kPlan); },
               ThrowsMessage<InputError>(HasSubstr("holds lens.yaml, which is not of")));
   EXPECT_EQ(TemporaryFolder::read_content(folder / "mine.txt"), "mine");
-}
-
-TEST_F(SessionResultsTest, RemoveOutputsOfLaterStepsKeepsNamedStep) {
-  SessionResults cached_result(results, session);
-  keep_two_steps(cached_result);
-  cached_result.remove_outputs_of_later_steps("lens");
-  cached_result.publish_outputs();
-  EXPECT_TRUE(cached_result.find_cached_step_result("lens", "key of the lens"));
-  EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
-  cached_result.remove_outputs_of_step("lens");
-  cached_result.publish_outputs();
-  EXPECT_FALSE(fs::exists(results / "lens.yaml"));
-  EXPECT_FALSE(cached_result.find_cached_step_result("lens", "key of the lens"));
 }
 
 TEST_F(SessionResultsTest, RejectsConcurrentRunOtherSessionAndForeignFiles) {

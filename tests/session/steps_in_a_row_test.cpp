@@ -15,7 +15,6 @@
 #include "session/rotation_step.h"
 #include "support/body_rig.h"
 #include "support/joint_covariance.h"
-#include "support/matchers.h"
 #include "support/station_verdicts.h"
 
 namespace vlp {
@@ -112,63 +111,6 @@ TEST(SequentialCalibration, JointCovarianceWithLensPredictsChangeOfZenithAndOffs
   EXPECT_GT(offset.norm(), 1e-6);
   // The effects of lens and zenith mostly cancel.
   EXPECT_LT((offset - offset_said).norm(), 0.02 * zenith.norm());
-}
-
-/// Tilt calibration from the lamps of a drive.
-TEST(RunTiltCalibrationStep, JointCovarianceWithLensPredictsChangeOfZenith) {
-  Random random(4);
-  Survey survey(kExactMap_m);
-  for (int k = 0; k < 40; ++k) {
-    const double x_m = random.uniform(-0.6, 0.6), y_m = random.uniform(-0.3, 0.3);
-    survey.stand({{x_m, y_m, 0}, 0.5 * k});
-  }
-  Calibration& calibration = survey.input.calibration;
-  const Eigen::MatrixXd covariance = lens_covariance(calibration.camera, 0.1, 8);
-  const auto leveled = [&] {
-    LampCaptures drive{{}, survey.truth.map, "lamps.yaml", calibration};
-    for (const auto& capture : survey.input.captures) {
-      drive.frames.push_back({capture.name, capture.detections});
-    }
-    const TiltResult result = run_tilt_calibration_step(drive, false, {});
-    EXPECT_TRUE(result.has_succeeded()) << result.message;
-    return result.calibration;
-  };
-  EXPECT_FALSE(leveled().covariance.value().find_row("fx"));
-  calibration.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.1, {}, {}, covariance};
-  const Calibration exact = leveled();
-  ASSERT_TRUE(exact.covariance && exact.covariance->find_row("fx"));
-  const auto before =
-      Eigen::Map<const Eigen::VectorXd>(calibration.camera.intrinsics.data(), covariance.rows())
-          .eval();
-  draw_lens(calibration, covariance, random);
-  const Eigen::VectorXd error =
-      Eigen::Map<const Eigen::VectorXd>(calibration.camera.intrinsics.data(), covariance.rows()) -
-      before;
-  const Eigen::Vector2d moved = compute_normalized_zenith_point(*leveled().rotation_center) -
-                                compute_normalized_zenith_point(*exact.rotation_center);
-  EXPECT_GT(moved.norm(), 1e-6);
-  const MatrixX jacobian =
-      derivative_by_lens(*exact.covariance, kZenithParameter, covariance.rows());
-  EXPECT_LT((moved - jacobian * error).norm(), 0.05 * moved.norm());
-}
-
-/// The camera moves by 8 mm between the readout of the middle row and that of the last.
-TEST(RunTiltCalibrationStep, TiltMatchesTruthForMovingCameraWithKnownMotion) {
-  BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
-  const Calibration camera = rig.calibration;
-  rig.calibration.rotation_center = tilted_by(camera.camera, 0.02, 1);
-  LampCaptures drive{{}, rig.map, "lamps.yaml", camera};
-  for (int k = 0; k < 40; ++k) {
-    rig.body.pose = {{0.03 * (k % 8) - 0.1, 0.04 * (k / 8) - 0.1, 0}, 0.5 * k};
-    rig.body.motion = {{0.4, -0.3}, 0, {0, 0}};
-    drive.frames.push_back({std::to_string(k), seen_from(rig, 0.01)});
-    drive.motions.push_back({rig.body.motion.velocity_m_per_s, 0, 1e-4, 1e-4});
-  }
-  const TiltResult result = run_tilt_calibration_step(drive, false, {});
-  ASSERT_TRUE(result.has_succeeded()) << result.message;
-  ASSERT_TRUE(result.calibration.rotation_center);
-  EXPECT_THAT(compute_normalized_zenith_point(*result.calibration.rotation_center),
-              IsNear(compute_normalized_zenith_point(*rig.calibration.rotation_center), 1e-7));
 }
 
 class SequentialCalibrationFixes : public testing::TestWithParam<MeasuredPoint> {};
