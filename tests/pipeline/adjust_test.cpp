@@ -48,34 +48,16 @@ class VlpAdjust : public testing::Test {
 
   ProgramResult adjust(const std::string& options) {
     write_lamp_map(folder / "lamps.yaml", rig.map);
-    return adjust_with_map("lamps.yaml", options);
-  }
-  ProgramResult adjust_with_map(const char* map, const std::string& options) {
     write_calibration(folder / "camera.yaml", rig.calibration);
     write_detections(folder / "detections.csv", frames);
     folder.file("captures.csv", captures);
     const auto path = [&](const char* name) { return (folder / name).string() + " "; };
-    return run_program("vlp-adjust " + path("detections.csv") + "--lamps " + path(map) +
+    return run_program("vlp-adjust " + path("detections.csv") + "--lamps " + path("lamps.yaml") +
                        "--calibration " + path("camera.yaml") + "-o " + path("adjusted.yaml") +
                        options);
   }
   std::string refined() { return "--refine-map " + (folder / "refined.yaml").string(); }
 };
-
-TEST_F(VlpAdjust, WritesOnlyLampsOfRoomOptionToRefinedMap) {
-  for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
-  write_lamp_map(folder / "lamps.yaml", rig.map);
-  std::string lamps = TemporaryFolder::read_content(folder / "lamps.yaml");
-  for (std::size_t at = 0; (at = lamps.find("{id: ", at)) != std::string::npos; at += 20) {
-    lamps.insert(at + 1, "room: hall, ");
-  }
-  folder.file("rooms.yaml", lamps + "  - {room: office, id: 901, position_m: [9, 9, 1.6]}\n");
-  const ProgramResult result = adjust_with_map("rooms.yaml", refined() + " --room hall");
-  ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output,
-              HasSubstr("contains the lamps of room hall only: use it without --room"));
-  EXPECT_EQ(read_lamp_map(folder / "refined.yaml").lamps.size(), rig.map.lamps.size());
-}
 
 TEST_F(VlpAdjust, ReducesMapErrorsAndAddsCalibrationUncertaintyToFixes) {
   const LampMap truth = rig.map;
@@ -108,17 +90,6 @@ TEST_F(VlpAdjust, ReducesMapErrorsAndAddsCalibrationUncertaintyToFixes) {
   ASSERT_EQ(located.exit_code, 0) << located.errors;
   const CsvTable fixes(folder / "fixes.csv");
   EXPECT_GT(read_number(fixes, 0, "x_sd_m"), read_number(fixes, 0, "x_noise_sd_m"));
-}
-
-TEST_F(VlpAdjust, CorrectsFocalLengthOnlyWithLensSdOption) {
-  const std::vector<double> truth = rig.calibration.camera.intrinsics;
-  rig.calibration.camera.intrinsics[0] *= 0.97;
-  EXPECT_THAT(adjust("--map-sd-m 0.001").output,
-              HasSubstr("treated as exact: the calibration has no"));
-  const ProgramResult result = adjust("--map-sd-m 0.001 --lens-sd-px 10");
-  ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, HasSubstr("lens        corrected"));
-  EXPECT_NEAR(read_calibration(folder / "adjusted.yaml").camera.focal_px().x() / truth[0], 1, 1e-3);
 }
 
 TEST_F(VlpAdjust, AsksForSecondHeightForOneCaptureOfTwoLamps) {

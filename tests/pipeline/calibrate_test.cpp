@@ -6,7 +6,6 @@
 
 #include <cmath>
 #include <fstream>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <regex>
 #include <sstream>
@@ -24,7 +23,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
-using testing::Not;
 
 const std::string kDatasets = VLP_SOURCE_DIR "/datasets/";
 
@@ -260,35 +258,6 @@ TEST_F(VlpCalibrateSmallSession, WritesSameResultsWhenResumedAfterKill) {
     EXPECT_EQ(result("report.html"), report) << moment;
   }
   EXPECT_GE(killed_in_time, 1) << "a busy machine may be late for the last moment";
-}
-
-TEST_F(VlpCalibrateSmallSession, WritesSessionJsonWithSkippedImagesSdsAndLampOffsets) {
-  folder.file("a session/rotation/0003.png", "no image");
-  fs::resize_file(folder / "a session/check/0001.png", 100);
-  const auto run = calibrate("--no-report --row-time-s 3e-5 --readout rows");
-  EXPECT_EQ(run.exit_code, 0) << run.errors;
-  EXPECT_THAT(run.errors, HasSubstr("0003.png: cannot be read as an image: it is not PNG"));
-  const auto json = nlohmann::json::parse(result("session.json"));
-  std::map<std::string, std::string> skipped;
-  std::size_t lamps = 0;
-  for (const auto& step : json["steps"]) {
-    if (step.contains("lamp_offsets")) lamps += step["lamp_offsets"].size();
-    if (!step.contains("skipped")) continue;
-    skipped[step["name"].get<std::string>()] = step["skipped"][0]["image"].get<std::string>();
-  }
-  EXPECT_EQ(skipped,
-            (std::map<std::string, std::string>{{"rotation", "0003.png"}, {"check", "0001.png"}}));
-  EXPECT_EQ(lamps, 6);
-  EXPECT_THAT(result("session.json"), Not(HasSubstr(path("")))) << "of no use elsewhere";
-  for (const char* name :
-       {"focal_sd_px", "principal_point_sd_px", "zenith_sd_deg", "lever_arm_sd_mm"}) {
-    ASSERT_EQ(json["calibration"][name].size(), 2) << name;
-    for (const auto& sd : json["calibration"][name]) {
-      EXPECT_GT(sd.get<double>(), 1e-4) << name;
-      EXPECT_LT(sd.get<double>(), 1) << name;
-    }
-  }
-  expect_documents_as_their_schemas_say();
 }
 
 TEST_F(VlpCalibrate, ErrorNamesMissingFolderFileOrUnknownOption) {

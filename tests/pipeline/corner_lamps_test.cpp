@@ -240,23 +240,6 @@ TEST_F(CornersToPoses, CovarianceMatchesErrorsOfCameraThatLooksDown) {
   EXPECT_NEAR(compute_normalized_squared_error(), 1, 0.16);
 }
 
-TEST_F(CornersToPoses, EstimatesSigmaOfCornersWithoutSd) {
-  constexpr double noise_px = 0.2;
-  see_tags(noise_px);
-  std::string table = TemporaryFolder::read_content(folder / "corners.csv");
-  table.replace(table.find("sd_px"), 5, "other");
-  folder.file("corners.csv", table);
-  EXPECT_THAT(convert("corners.csv"), HasSubstr("px estimated from neighboring corners"));
-  const auto frames = read_detections(folder / "points/detections.csv");
-  ASSERT_EQ(frames.size(), truth.size());
-  for (const Frame& frame : frames) {
-    for (const Detection& detection : frame.detections)
-      ASSERT_NEAR(detection.sigma_px.value(), noise_px, 0.1 * noise_px);
-  }
-  locate();
-  EXPECT_NEAR(compute_normalized_squared_error(), 1, 0.2);
-}
-
 /// A fix takes at most 256 lamps; the lamps that are left are spread over the board.
 TEST_F(CornersToPoses, KeepsEveryNthCornerOfLargeBoard) {
   folder.file("board.yaml",

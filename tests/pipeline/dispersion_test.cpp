@@ -72,31 +72,6 @@ TEST_F(VlpDispersion, CorrectedCalibrationYieldsExactFixAtOtherPosition) {
   EXPECT_NEAR(read_number(fixes, 0, "z_m"), 0.25, 2e-6);
 }
 
-TEST_F(VlpDispersion, ReadsCapturePositionsFromCapturesCsv) {
-  const auto frames = turn(6, 6.28);
-  std::string table = "image,x_m,y_m\n";
-  for (int i = 0; i < 5; ++i) table += std::to_string(i) + ".png,0.1,-0.05\n";
-  const auto fewer = dispersion(frames, "--captures " + folder.file("c.csv", table).string());
-  EXPECT_EQ(fewer.exit_code, 0);
-  EXPECT_THAT(fewer.errors, HasSubstr("1 of 6 captures have no position"));
-  folder.file("c.csv", "image,time_s\n0.png,0\n");
-  const auto none = dispersion(frames, "--captures " + path("c.csv"));
-  EXPECT_EQ(none.exit_code, 2);
-  EXPECT_THAT(none.errors, HasSubstr("c.csv: no capture has a position"));
-}
-
-TEST_F(VlpDispersion, RequiresOneYawForChenGuanMethodAndSeveralYawsOtherwise) {
-  const std::string point = "--reference-point 0.1 -0.05", paper = point + " --method chen-guan";
-  const auto refused = dispersion(turn(6, 0), point);
-  EXPECT_EQ(refused.exit_code, 3);
-  EXPECT_THAT(refused.errors, HasSubstr("turn the camera at the reference point"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "calibration.yaml"));
-  EXPECT_EQ(dispersion(turn(6, 6.28), paper).exit_code, 3);
-  const auto of_paper = dispersion(turn(6, 0), paper + " --circle enclosing");
-  EXPECT_EQ(of_paper.exit_code, 0) << of_paper.errors;
-  EXPECT_THAT(of_paper.output, HasSubstr("assumed correct"));
-}
-
 /// From images at the reference point of a scene: a camera whose rotation center has an error of
 /// 2 px and -3 px.
 TEST(VlpDispersionOfRenderedImages, OffsetIsNegativeErrorOfRotationCenter) {

@@ -141,44 +141,6 @@ TEST_F(VlpEvaluate, PrintsErrorsForPathOptionAndWithLineFitForLineOption) {
   EXPECT_EQ(problems_by_schema("evaluation", {folder / "line.json"}), "");
 }
 
-TEST_F(VlpEvaluate, CompareOptionReportsBetterSameOrWorseRun) {
-  std::string good = kFixes, bad = kFixes, truth = "image,x_m,y_m\n";
-  for (int i = 0; i < 20; ++i) {
-    const std::string name = std::to_string(i);
-    good += name + ",ok," + name + ".0001,0,0,0,,,,,3,0\n";
-    bad += name + ",ok," + name + (i % 2 == 0 ? ".0003" : ".0002") + ",0,0,0,,,,,3,0\n";
-    truth += name + "," + name + ",0\n";
-  }
-  folder.file("fixes.csv", good);
-  folder.file("other.csv", bad);
-  folder.file("truth.csv", truth);
-  EXPECT_THAT(with_truth("--compare other.csv --gate worse_mm=0 --json better.json").output,
-              AllOf(HasSubstr("compared    horizontal error better by more than 0.0025 mm: mean "
-                              "differs by -0.150 mm"),
-                    HasSubstr("20 in both: 20 with a smaller error")));
-  folder.file("same.csv", good);
-  EXPECT_THAT(with_truth("--compare same.csv --json same.json").output,
-              HasSubstr("equivalent within 0.001 mm"));
-  EXPECT_THAT(with_truth("--compare fixes.csv").errors, HasSubstr("is the file of the fixes"));
-  // All errors are significantly larger by 0.17 um, which is negligible.
-  std::string hardly = good;
-  for (auto at = hardly.find(".0001,"); at != std::string::npos; at = hardly.find(".0001,", at)) {
-    hardly.replace(at, 6, ".00010017,");
-  }
-  folder.file("fixes.csv", hardly);
-  folder.file("other.csv", good);
-  const auto same = with_truth("--compare other.csv --gate worse_mm=0");
-  EXPECT_EQ(same.exit_code, 0) << same.output;
-  EXPECT_THAT(same.output, HasSubstr("horizontal error equivalent within 0.001 mm: mean differs"));
-  folder.file("fixes.csv", bad);
-  folder.file("other.csv", good);
-  EXPECT_EQ(with_truth("--compare other.csv --gate worse_mm=0").exit_code, 1);
-  folder.file("other.csv", kFixes + "x,ok,0,0,0,0,,,,,3,0\n");
-  EXPECT_EQ(problems_by_schema("evaluation", {folder / "better.json", folder / "same.json"}), "");
-  EXPECT_EQ(with_truth("--compare other.csv").exit_code, 2);
-  EXPECT_EQ(evaluate("--line 0 0 9 0 --compare other.csv").exit_code, 2);
-}
-
 /// Baseline of 42 captures at as many places, and changes of it that have to be red.
 TEST_F(VlpEvaluate, CompareOptionFailsForWorseHeightYawOrSdAndForLostRows) {
   const auto make_fixes = [](int first, double height_m, double yaw_rad, double sd_m) {
@@ -227,33 +189,6 @@ TEST_F(VlpEvaluate, CompareOptionFailsForWorseHeightYawOrSdAndForLostRows) {
   folder.file("baseline.csv.origin", "commit none\nsha256 " + compute_text_sha256(accepted) + "\n");
   EXPECT_EQ(compare(accepted, accepted).exit_code, 0);
   expect_refused(make_fixes(0, 0.001, 0, 0.001), "baseline.csv: was changed after it was accepted");
-}
-
-TEST_F(VlpEvaluate, ErrorsOfExampleAreWithinThirtyPercentOfCrlbForTrueNoise) {
-  // Errors of 36 fixes are within 30 % of the limit of their noise: three standard errors.
-  const auto result =
-      evaluate_example("--noise-px 0.05 --gate crlb_ratio=1.3,normalized_error_rms=1.3");
-  EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output,
-              AllOf(HasSubstr("limit       0.1"), HasSubstr("error / sd  horizontal")));
-  EXPECT_THAT(evaluate_example("--noise-px 0.1").output,
-              HasSubstr("(below the limit: see the warning)"));
-}
-
-TEST_F(VlpEvaluate, WritesIdenticalJsonForOneAndFourThreads) {
-  std::string fixes = kFixes, truth = "image,x_m,y_m\n";
-  for (int i = 0; i < 60; ++i) {  // enough for intervals
-    const std::string name = std::to_string(i) + ".png,", x_m = std::to_string(i);
-    fixes += name + "ok," + x_m + ".00" + std::to_string(i % 7) + ",0,0,0,,,,,3,0\n";
-    truth += name + x_m + ",0\n";
-  }
-  folder.file("fixes.csv", fixes);
-  folder.file("truth.csv", truth);
-  with_truth("--threads 1 --json one.json");
-  with_truth("--threads 4 --json four.json");
-  EXPECT_THAT(content("one.json"), HasSubstr("intervals_95"));
-  EXPECT_EQ(content("one.json"), content("four.json"));
-  EXPECT_THAT(content("one.json"), StartsWith("{\n  \"format\": \"vlp-evaluation/4\""));
 }
 
 }  // namespace

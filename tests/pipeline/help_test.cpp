@@ -13,7 +13,6 @@
 #include <string>
 #include <vector>
 
-#include "program/reference.h"
 #include "program/steps/step_outcome.h"
 #include "support/program.h"
 #include "support/temporary_folder.h"
@@ -173,27 +172,6 @@ TEST(BashCompletion, CompletesChoicesCommandsAndFiles) {
               testing::ElementsAre((folder / "lamps.yaml").string()));
   EXPECT_THAT(completed("vlp-locate", begin), testing::SizeIs(1));
   EXPECT_THAT(completed("vlp-locate", "--sigma-px " + begin), testing::ElementsAre(""));
-}
-
-/// No program with commands has an option with choices beside them: here is one.
-TEST(BashCompletion, CompletesChoicesOfOptionInsteadOfCommands) {
-  CLI::App app("Tests.", "vlp-odd");
-  std::string kind;
-  double size = 0;
-  app.add_option("--kind", kind)->check(CLI::IsMember({"red", "blue"}));
-  app.add_option("--size", size);
-  app.add_subcommand("run", "Runs.");
-  const TemporaryFolder folder;
-  const std::string script = folder.file("odd.bash", format_bash_completion(app)).string();
-  const auto offered = [&](const std::string& words) {
-    return split_lines(run_program("bash -c 'source " + script + "; COMP_WORDS=(vlp-odd " + words +
-                                   "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _vlp_odd; "
-                                   "printf \"%s\\n\" \"${COMPREPLY[@]}\"'")
-                           .output);
-  };
-  EXPECT_THAT(offered("--kind \"\""), testing::UnorderedElementsAre("red", "blue"));
-  EXPECT_THAT(offered("--size \"\""), testing::ElementsAre(""));
-  EXPECT_THAT(offered("\"\""), testing::ElementsAre("run"));
 }
 
 /// An option that was renamed would be recorded.

@@ -136,25 +136,6 @@ TEST_F(TiltedCamera, FixesAreWithinOneMillimeterForUnknownTiltUpTo50Degrees) {
     check(tilt_deg, "--roll-pitch-sd-deg 90", fmt::format("deg_{}", tilt_deg));
 }
 
-/// The inclination in captures.csv determines the plane in which lamps are discs.
-TEST_F(TiltedCamera, FixesAreWithinOneMillimeterWithInclinationSensor) {
-  for (const int tilt_deg : {5, 15}) add_set(tilt_deg);
-  render();
-  for (const int tilt_deg : {5, 15}) {
-    for (const std::string axis : {"roll", "pitch"}) {
-      const std::string set = fmt::format("{}{}", axis, tilt_deg);
-      std::string table = "image,roll_rad,pitch_rad\n";
-      for (const TruthRow& row : read_truth_table(folder / "out" / set / "truth.csv")) {
-        const double tilt_rad = tilt_deg * std::numbers::pi / 180;
-        table += fmt::format("{},{},{}\n", row.image, axis == "roll" ? tilt_rad : 0,
-                             axis == "pitch" ? tilt_rad : 0);
-      }
-      folder.file("out/" + set + "/captures.csv", table);
-    }
-    check(tilt_deg, "", fmt::format("told_deg_{}", tilt_deg));
-  }
-}
-
 /// A camera of 3 Mpx close to large lamps, which show enough stripes from aside.
 TEST_F(TiltedCamera, FixesAreWithinThreeMillimetersForUnknownTiltUpTo80Degrees) {
   std::string scene = kScene;

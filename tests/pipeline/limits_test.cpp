@@ -15,7 +15,6 @@ namespace vlp {
 namespace {
 
 using testing::HasSubstr;
-using testing::Not;
 using testing::StartsWith;
 
 const std::string kLimits = "vlp-limits --lamps " VLP_SOURCE_DIR
@@ -43,40 +42,6 @@ TEST(VlpLimits, PrintsErrorOfEachSourceAndTotal) {
                          std::hypot(horizontal_mm("noise"), horizontal_mm("lamp map"))),
               0.2);
   EXPECT_THAT(TemporaryFolder::read_content(folder / "map.png"), StartsWith("\x89PNG"));
-}
-
-TEST(VlpLimits, HorizontalErrorIncludesMotionAndRollAndPitch) {
-  const TemporaryFolder folder;
-  const auto compute_map = [&](const std::string& options) {
-    const auto result = run_program(kLimits + "--floor-m -0.2 0.2 0 0.1 --step-m 0.1 --map " +
-                                    (folder / "map.csv").string() + options);
-    EXPECT_EQ(result.exit_code, 0) << result.errors;
-    return std::pair(result.output, CsvTable(folder / "map.csv"));
-  };
-  const auto [output, map] = compute_map(
-      " --max-speed-m-per-s 2 --roll-pitch-sd-deg 90 --picture " + (folder / "map.svg").string());
-  for (const char* row : {"\nmotion ", "\nroll and pitch ", ", a fix at "}) {
-    EXPECT_THAT(output, HasSubstr(row));
-  }
-  EXPECT_THAT(TemporaryFolder::read_content(folder / "map.svg"),
-              HasSubstr("up to 2 m/s, roll and pitch sd 90 deg"));
-  const auto [standing_output, standing] = compute_map("");
-  EXPECT_THAT(standing_output, Not(HasSubstr("motion")));
-  ASSERT_EQ(map.num_rows(), standing.num_rows());
-  int with_fix = 0;
-  for (std::size_t row = 0; row < map.num_rows(); ++row) {
-    EXPECT_EQ(read_number(map, row, "lamps"), read_number(standing, row, "lamps"));
-    if (read_text(map, row, "noise_m").empty()) continue;
-    ++with_fix;
-    const double noise_m = read_number(map, row, "noise_m");
-    EXPECT_NEAR(noise_m, read_number(standing, row, "noise_m"), 1e-3 * noise_m);
-    EXPECT_NEAR(read_number(map, row, "horizontal_m"),
-                std::hypot(noise_m, read_number(map, row, "motion_m"),
-                           read_number(map, row, "roll_pitch_m")),
-                1e-8);  // six digits
-    EXPECT_GT(read_number(map, row, "roll_pitch_m"), noise_m);
-  }
-  EXPECT_GT(with_fix, 0);
 }
 
 /// A calibration of the tests' rig that states its zenith, and a map that states its survey.

@@ -66,27 +66,6 @@ TEST_F(VlpLocate, WritesRowPerFrameWithFixOrStatus) {
   EXPECT_THAT(result.errors, HasSubstr("2 detections that contradict the others"));
 }
 
-TEST_F(VlpLocate, PositionSdScalesWithSigmaPxOptionAndMatchesScatterOfFixesWithoutSigmaPx) {
-  locate({{"a", seen(4, 0.1)}});
-  const double stated_m = figure(0, "x_sd_m");
-  locate({{"a", seen(4, 0.1)}}, "--sigma-px 0.3");
-  EXPECT_NEAR(figure(0, "x_sd_m"), 3 * stated_m, 1e-4 * stated_m);
-
-  Random random(5);
-  std::vector<Frame> frames;
-  for (int i = 0; i < 500; ++i) {
-    frames.push_back({std::to_string(i), with_noise(seen(4, 0.2), random)});
-    for (Detection& detection : frames.back().detections) detection.sigma_px.reset();
-  }
-  const auto result = locate(frames);
-  EXPECT_THAT(result.errors, HasSubstr("px estimated from the residuals"));
-  double scatter = 0;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    scatter += std::pow(figure(i, "x_m") - 0.1, 2) / static_cast<double>(frames.size());
-  }
-  EXPECT_NEAR(figure(0, "x_sd_m"), std::sqrt(scatter), 0.1 * std::sqrt(scatter));
-}
-
 TEST_F(VlpLocate, UsesInclinationHeightAndYawOfCapturesTable) {
   rig.inclination = {0.05, -0.03};
   const auto captures =

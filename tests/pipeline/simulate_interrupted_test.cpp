@@ -1,7 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
 /// A run of vlp-simulate that ends early leaves whole files, and the next one does the rest.
-#include <sys/stat.h>
 
 #include <chrono>
 
@@ -12,34 +11,6 @@ namespace vlp {
 namespace {
 
 using VlpSimulateInterrupted = SmallSimulation;
-
-ino_t file_number(const std::filesystem::path& file) {
-  struct stat status {};
-  EXPECT_EQ(::stat(file.c_str(), &status), 0) << file;
-  return status.st_ino;
-}
-
-TEST_F(VlpSimulateInterrupted, RendersOnlyMissingImagesWhenRepeated) {
-  const Files expected = undisturbed();
-  ASSERT_EQ(simulate().exit_code, 0);
-  for (const char* name : {"lamps/0003.png", "lamps/0015.png", "boards/0000.png",
-                           "lamps/true_detections.csv", "true_lamps.yaml"}) {
-    ASSERT_TRUE(std::filesystem::remove(output / name));
-  }
-  std::map<std::string, std::pair<ino_t, std::filesystem::file_time_type>> before;
-  for (const std::string& image : find_images(files_below(output))) {
-    before[image] = {file_number(output / image), last_write_time(output / image)};
-  }
-  ASSERT_EQ(before.size(), 21U);
-  const auto result = simulate();
-  EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_EQ(result.output, "rendered 3 captures, 21 existed; in " + output.string() + "\n");
-  EXPECT_TRUE(files_below(output) == expected);
-  for (const auto& [image, mark] : before) {
-    EXPECT_EQ(file_number(output / image), mark.first) << image;
-    EXPECT_EQ(last_write_time(output / image), mark.second) << image;
-  }
-}
 
 TEST_F(VlpSimulateInterrupted, LeavesOnlyCompleteFilesWhenKilledAndResumes) {
   const Files expected = undisturbed();

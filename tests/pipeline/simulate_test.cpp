@@ -53,17 +53,6 @@ TEST_F(VlpSimulate, WritesIdenticalFilesForAnyThreadCountOrderAndOwnSceneFile) {
   EXPECT_TRUE(files_below(output) == expected);
 }
 
-TEST_F(VlpSimulate, SeedChangesImagesButNotMapsAndCalibration) {
-  const Files first = undisturbed();
-  const Files other = undisturbed("--seed 2");
-  for (const std::string& image : find_images(first)) EXPECT_NE(first.at(image), other.at(image));
-  for (const std::string name :
-       {"lamps.yaml", "true_lamps.yaml", "board.yaml", "true_calibration.yaml"}) {
-    EXPECT_EQ(first.at(name), other.at(name)) << name;
-  }
-  EXPECT_NE(first.at("boards/true_boards.csv"), other.at("boards/true_boards.csv"));
-}
-
 TEST_F(VlpSimulate, WarnsOfBadExposureUnclearStripesAndEmptyViews) {
   const auto warnings_with = [&](const std::string& from, const std::string& to) {
     change_scene(from, to);

@@ -174,18 +174,6 @@ TEST_F(VlpStation, RecordsVerdictAndRestoresFilesThatCouldNotBeWritten) {
   EXPECT_THAT(certified.errors, HasSubstr("was not judged (boards"));
 }
 
-/// Repetitions of evaluated units are found in the records.
-TEST_F(VlpStation, WarnsThatReuseOfImagesIsUncheckedWhileRecordsAreOffline) {
-  change("station.yaml", "records: records.db", "records: share/records.db");
-  render();
-  const auto passed = run_program(batch());
-  EXPECT_EQ(passed.exit_code, 0) << passed.errors;
-  const std::string unchecked =
-      "the records are offline: whether an earlier run used the same images was not checked";
-  EXPECT_THAT(passed.errors, HasSubstr("warning: " + unchecked + "\n"));
-  EXPECT_THAT(records("show").output, ContainsRegex("unchecked +20[^ ]+ .*" + unchecked));
-}
-
 /// Records away: units get their verdicts all the same, and nothing is lost.
 TEST_F(VlpStation, SpoolsRunsAndDeliversThemWhenRecordsReturn) {
   change("station.yaml", "records: records.db", "records: share/records.db");

@@ -102,51 +102,6 @@ TEST_F(VlpTrain, WritesTrueRowTimeAndReadoutFromUnlabeledImages) {
   EXPECT_EQ(found.history.back().program, "vlp-train");
 }
 
-/// Without its first lamp, which shows too few stripes, the frequencies of this scene fit two row
-/// times.
-TEST_F(VlpTrain, LampPositionsDecideBetweenTwoFittingRowTimes) {
-  const fs::path set = folder / "archive";
-  const auto simulated = run_program("vlp-simulate " VLP_SOURCE_DIR
-                                     "/datasets/archive/scene.yaml -q --only rotation -o " +
-                                     set.string());
-  ASSERT_EQ(simulated.exit_code, 0) << simulated.errors;
-  const std::string command = "vlp-train --row-time " + (set / "rotation").string() + " --lamps ";
-  const std::string lamps = (set / "lamps.yaml").string();
-  const std::string calibration = " --calibration " + (set / "true_calibration.yaml").string();
-  for (const std::string& camera : {calibration, std::string()}) {
-    const auto result = run_program(command + lamps + camera);
-    ASSERT_EQ(result.exit_code, 0) << result.errors;
-    EXPECT_THAT(result.output, testing::ContainsRegex("row time    (29[.]9|30[.]0)"));
-    EXPECT_THAT(result.output, HasSubstr("of 5 lamps"));
-  }
-  // Frequencies elsewhere in the room: the places fit neither row time.
-  std::string map = TemporaryFolder::read_content(lamps);
-  map.replace(map.find("[-0.6, 0.3"), 10, "[0.6, 0.32");
-  map.replace(map.find("[0.6, 0.3,"), 10, "[-0.6, 0.3,");
-  const auto swapped = run_program(command + folder.file("swapped.yaml", map).string());
-  EXPECT_EQ(swapped.exit_code, 3) << swapped.output;
-  EXPECT_THAT(swapped.errors, HasSubstr("fit a row time of"));
-  EXPECT_THAT(swapped.errors, HasSubstr("neither duties nor positions of the lamps decide"));
-}
-
-TEST_F(VlpTrain, VlpDetectEstimatesColumnReadoutWhenCalibrationHasNone) {
-  const std::string wide = VLP_SOURCE_DIR "/datasets/wide/rendered";
-  std::string calibration = TemporaryFolder::read_content(wide + "/true_calibration.yaml");
-  calibration.erase(calibration.find("  readout: columns\n"), 19);
-  const std::string command = "vlp-detect " + wide + "/sample --lamps " + wide + "/lamps.yaml -o " +
-                              (folder / "found.csv").string() + " --calibration " +
-                              folder.file("c.yaml", calibration).string();
-  const auto found = run_program(command);
-  ASSERT_EQ(found.exit_code, 0) << found.errors;
-  EXPECT_THAT(found.errors, HasSubstr("the images show stripes along columns"));
-  const auto lamps = CsvTable(folder / "found.csv").num_rows();
-  EXPECT_GE(lamps, 6);
-  ASSERT_EQ(run_program(command + " --readout columns").exit_code, 0);
-  EXPECT_EQ(CsvTable(folder / "found.csv").num_rows(), lamps);
-  EXPECT_EQ(run_program(command + " --readout rows").exit_code, 3);
-  EXPECT_EQ(run_program(command + " --readout diagonal").exit_code, 2);
-}
-
 TEST_F(VlpTrain, VlpDetectWarnsOfInseparableLampsWithoutClassifier) {
   std::string map = TemporaryFolder::read_content(kRig + "/lamps.yaml");
   map.replace(map.find("2000"), 4, "1620");

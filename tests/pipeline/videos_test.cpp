@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Videos as input of vlp-detect and vlp-intrinsics, against the images that they were made of.
+/// Videos as input of vlp-detect, against the images that they were made of.
 #include <gmock/gmock.h>
 
 #include <filesystem>
@@ -19,7 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 using testing::Not;
-using testing::StartsWith;
 
 /// Writes a video of the images in a folder, each repeated `times` times. Returns false on failure.
 bool write_video_of_folder(const fs::path& file, const fs::path& folder, int times,
@@ -79,39 +78,6 @@ TEST_F(VlpDetectVideo, YieldsSameDetectionsAsImages) {
   EXPECT_THAT(TemporaryFolder::read_content(folder / "first.csv"),
               Not(HasSubstr("drive.avi#000001")));
 }
-
-TEST_F(VlpDetectVideo, RejectsUnusableVideosWithOneLineErrorAndWarnsOfTruncatedOne) {
-  const auto refused = [&](const std::string& images, const std::string& options,
-                           const std::string& message) {
-    const auto result = detect(images, "found.csv", options);
-    EXPECT_EQ(result.exit_code, 2);
-    EXPECT_EQ(result.errors, "vlp-detect: error: " + message + "\n");
-    EXPECT_FALSE(fs::exists(folder / "found.csv"));
-  };
-  const std::string none = folder.file("none.mp4", "no video").string();
-  refused(none, "", none + ": cannot be opened as a video: is it cut short, or none?");
-  refused(kRig + "/sample", "--every 2", "--every: there is no video; leave it out");
-  refused(kRig + "/sample", "--captures " + (folder / "captures.csv").string(),
-          "--captures: images have no frame times; use it for a video only");
-  const auto located =
-      run_program("vlp-locate " + none + " --lamps " + kRig + "/lamps.yaml --calibration " + kRig +
-                  "/true_calibration.yaml -o " + (folder / "fixes.csv").string());
-  EXPECT_THAT(located.errors, HasSubstr("is a video; use vlp-detect"));
-
-  const std::string film = (folder / "drive.avi").string();
-  if (!write_video_of_folder(film, kRig + "/sample", 6)) GTEST_SKIP() << "OpenCV writes no FFV1";
-  const auto over = detect(film, "drive.avi");
-  EXPECT_EQ(over.errors,
-            "vlp-detect: error: " + film + ": is also an input and would be overwritten\n");
-  const std::string bytes = TemporaryFolder::read_content(film);
-  const std::string cut = folder.file("cut.avi", bytes.substr(0, bytes.size() * 6 / 10)).string();
-  const auto result = detect(cut, "found.csv");
-  EXPECT_EQ(result.exit_code, 0);
-  EXPECT_THAT(result.errors, StartsWith("vlp-detect: warning: " + cut + ": "));
-  EXPECT_THAT(result.errors, HasSubstr(" of its 12 frames can be decoded; is it cut short"));
-}
-
-class BoardVideo : public VlpIntrinsics {};
 
 }  // namespace
 }  // namespace vlp
