@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <string>
 #include <vector>
 
 #include "detection/boards/board_detector.h"
@@ -115,24 +114,6 @@ TEST(BoardDetector, DetectsTagsWithBordersOfTwoAndThreeBits) {
   }
 }
 
-TEST(MakeApriltagDetector, LocatesCornersInSmallAndLargeImages) {
-  const DrawnTags drawn(make_board(2, 2), 6);
-  const auto finder = make_apriltag_detector(drawn.board);
-  for (const cv::Size size : {drawn.image.size(), cv::Size(1000, 1000)}) {
-    cv::Mat1b image(size, DrawnTags::kWhite);
-    drawn.image.copyTo(image(cv::Rect({0, 0}, drawn.image.size())));
-    const auto tags = finder->detect_tags(image);
-    ASSERT_EQ(tags.size(), 4U) << size;
-    for (const TagDetection& tag : tags) {
-      const auto expected = std::ranges::find(drawn.truth, tag.id, &TagDetection::id);
-      ASSERT_NE(expected, drawn.truth.end());
-      for (std::size_t k = 0; k < 4; ++k) {
-        EXPECT_THAT(tag.corners_px[k], IsNear(expected->corners_px[k], 0.2)) << size << k;
-      }
-    }
-  }
-}
-
 TEST(MakeApriltagDetector, CorrectsTwoWrongBits) {
   constexpr int bit_px = 6;
   for (const auto& [border_bits, id] : {std::pair(1, 0), {2, 0}, {2, 1}, {2, 2}, {2, 3}}) {
@@ -153,57 +134,6 @@ TEST(MakeApriltagDetector, CorrectsTwoWrongBits) {
           << border_bits << " " << num_wrong;
     }
   }
-}
-
-TEST(MakeArucoDetector, LocatesCornersOfTagsForEachFamily) {
-  for (const std::string family : {"tag36h11", "tag25h9", "tag16h5"}) {
-    Board board = make_board(2, 2);
-    board.family = family;
-    board.corner_squares = true;
-    board.tag_spacing = 0.25;
-    const DrawnTags drawn(board, 8);
-    const auto tags = make_aruco_detector(board)->detect_tags(drawn.image);
-    ASSERT_EQ(tags.size(), 4U) << family;
-    for (const TagDetection& tag : tags) {
-      const auto expected = std::ranges::find(drawn.truth, tag.id, &TagDetection::id);
-      ASSERT_NE(expected, drawn.truth.end());
-      for (std::size_t k = 0; k < 4; ++k) {
-        EXPECT_THAT(tag.corners_px[k], IsNear(expected->corners_px[k], 3)) << family << k;
-      }
-    }
-  }
-}
-
-TEST(ScaleImageTo8Bits, ScalesBrightestPixelTo255) {
-  cv::Mat1w image(2, 2);
-  image << 0, 1000, 2000, 4000;
-  const cv::Mat1b scaled = scale_image_to_8_bits(image);
-  EXPECT_EQ(scaled(0, 0), 0);
-  EXPECT_EQ(scaled(0, 1), 64);
-  EXPECT_EQ(scaled(1, 0), 128);
-  EXPECT_EQ(scaled(1, 1), 255);
-  EXPECT_EQ(cv::countNonZero(scale_image_to_8_bits(cv::Mat1w(2, 2, uint16_t{0}))), 0);
-  EXPECT_EQ(scale_image_to_8_bits(cv::Mat1b(2, 2, uchar{7}))(1, 1), 7);
-}
-
-TEST(CollectDetectedCorners, ReturnsPointsOrElseCornersOfTags) {
-  BoardDetection seen;
-  for (const int id : {2, 5}) {
-    TagDetection tag{id, {}};
-    for (std::size_t k = 0; k < 4; ++k) tag.corners_px[k] = {double(id), double(k)};
-    seen.tags.push_back(tag);
-  }
-  const auto corners = collect_detected_corners(seen);
-  ASSERT_EQ(corners.size(), 8U);
-  for (std::size_t i = 0; i < 8; ++i) {
-    EXPECT_EQ(corners[i].index, (i < 4 ? 8 : 20) + i % 4);
-    EXPECT_EQ(corners[i].pixel, Eigen::Vector2d(i < 4 ? 2 : 5, double(i % 4)));
-    EXPECT_EQ(corners[i].weight, 1);
-  }
-  seen.points = {{3, {1, 2}}};
-  ASSERT_EQ(collect_detected_corners(seen).size(), 1U);
-  EXPECT_EQ(collect_detected_corners(seen)[0].index, 3U);
-  EXPECT_TRUE(collect_detected_corners({}).empty());
 }
 
 }  // namespace

@@ -236,16 +236,6 @@ TEST(SquareCorners, ReturnsNoCornersIfSquaresAreCovered) {
   EXPECT_TRUE(BoardDetector(board).detect_board(image).points.empty());
 }
 
-TEST(SquareCorners, FindsNoPartOfChessboardInImageWithoutBoard) {
-  const BoardDetector detector(squares(BoardKind::chessboard, 9, 6));
-  for (const cv::Size size :
-       {cv::Size(100, 120), cv::Size(12, 120), cv::Size(4000, 40), cv::Size(9, 120), cv::Size()}) {
-    const BoardDetection seen = detector.detect_board(cv::Mat1b(size, uchar{100}));
-    EXPECT_TRUE(seen.points.empty());
-    EXPECT_EQ(seen.largest_chessboard_part, (std::array{0, 0}));
-  }
-}
-
 TEST(OtherBoardKinds, MarkerDictionaryIsNamed) {
   Board charuco = squares(BoardKind::charuco, 7, 5);
   const cv::Mat markers = drawn_by_opencv(charuco);

@@ -60,34 +60,6 @@ TEST(CorrectViewsForToneCurve, InterpolatesCornersAndCurvaturesAtEstimatedGamma)
   }
 }
 
-TEST(CorrectViewsForToneCurve, InterpolatesCornerSdsLinearlyInLogGamma) {
-  std::vector<BoardView> images{image(1.8, 500)};
-  TagDetection& tag = images[0].detection.tags[0];
-  const double at = std::log(1.8 / 1.6) / std::log(2.0 / 1.6);
-  for (std::size_t i = 0; i < 4; ++i)
-    tag.tone_curve_fits[i].corner_sds_px[0] = std::array{0.024, 0.024, 0.026, 0.19}[i];
-  tag.tone_curve_fits[2].corner_sds_px[1] = 0;  // unknown for one of the tone curves
-  apply_curve_of_levels(images);
-  EXPECT_NEAR(images[0].detection.tags[0].corner_sds_px[0], 0.024 + at * 0.002, 1e-9);
-  EXPECT_EQ(images[0].detection.tags[0].corner_sds_px[1], 0);
-}
-
-TEST(CorrectViewsForToneCurve, InterpolatesStepsUnlessOneIsUnknown) {
-  std::vector<BoardView> images{image(1.8, 500)};
-  TagDetection& tag = images[0].detection.tags[0];
-  const double at = std::log(1.8 / 1.6) / std::log(2.0 / 1.6);
-  tag.tone_curve_fits[1].steps[0] = {0.7, 20, 180};
-  tag.tone_curve_fits[2].steps[0] = {0.9, 10, 220};
-  tag.tone_curve_fits[1].steps[1] = {0.7, 20, 180};
-  tag.tone_curve_fits[2].steps[1] = {};
-  apply_curve_of_levels(images);
-  const EdgeStep& step = images[0].detection.tags[0].steps[0];
-  EXPECT_NEAR(step.blur_px, 0.7 + at * 0.2, 1e-9);
-  EXPECT_NEAR(step.dark, 20 - at * 10, 1e-9);
-  EXPECT_NEAR(step.bright, 180 + at * 40, 1e-9);
-  EXPECT_EQ(images[0].detection.tags[0].steps[1].blur_px, 0);
-}
-
 TEST(CorrectViewsForToneCurve, CorrectsAllViewsForOneCommonGamma) {
   std::vector<BoardView> images{image(1.6, 300), image(2.0, 300), image(1.1, 10)};
   const double gamma = apply_curve_of_levels(images);
@@ -102,12 +74,6 @@ TEST(CorrectViewsForToneCurve, KeepsCornersWhenOnlyOneOfManyViewsShowsCurve) {
   images.push_back(image(2.4, 1e7));
   EXPECT_EQ(apply_curve_of_levels(images), 1);
   EXPECT_EQ(images.back().detection.tags[0].corners_px[0].x(), 100);
-}
-
-TEST(CorrectViewsForToneCurve, KeepsCornersWhenGammaIsCloseToOne) {
-  std::vector<BoardView> images{image(1.15, 500)};
-  EXPECT_EQ(apply_curve_of_levels(images), 1);
-  EXPECT_EQ(images[0].detection.tags[0].corners_px[0].x(), 100);
 }
 
 TEST(CorrectViewsForToneCurve, ChangesNoCornersOfViewsWithoutToneCurveFits) {
@@ -132,32 +98,6 @@ TEST(CorrectViewsForToneCurve, EstimatesGammaOfOneWithoutViewsOrTags) {
   std::vector<BoardView> none, without(2);
   EXPECT_EQ(apply_curve_of_levels(none), 1);
   EXPECT_EQ(apply_curve_of_levels(without), 1);
-}
-
-TEST(EstimateToneCurveGamma, ReturnsMinimumOfParabolaOverLogGamma) {
-  for (const double gamma : {1.0, 1.1, 1.45, 1.8, 2.1, 2.4}) {
-    ValuesPerGamma costs{};
-    for (std::size_t i = 0; i < costs.size(); ++i) {
-      costs[i] = 7 + 30 * std::pow(std::log(kGammas[i] / gamma), 2);
-    }
-    EXPECT_NEAR(estimate_tone_curve_gamma(costs), gamma, 1e-9);
-  }
-}
-
-TEST(EstimateToneCurveGamma, ReturnsEndOfRangeForMonotonicCosts) {
-  EXPECT_NEAR(estimate_tone_curve_gamma({1, 2, 4, 8, 16}), 1, 1e-12);
-  EXPECT_NEAR(estimate_tone_curve_gamma({1, 3, 4, 4.5, 4.7}), 1, 1e-12);  // concave
-  EXPECT_NEAR(estimate_tone_curve_gamma({16, 8, 4, 2, 1}), 2.4, 1e-12);
-  EXPECT_NEAR(estimate_tone_curve_gamma({9, 8.9, 8.5, 7, 1}), 2.4, 1e-12);  // concave
-  EXPECT_NEAR(estimate_tone_curve_gamma({3, 3, 3, 3, 3}), 1, 1e-12);
-}
-
-TEST(SumToneCurveCosts, SumsLimitedDifferencesFromSmallestCost) {
-  std::vector<BoardView> views(4);
-  views[0].detection.curve_costs = {10, 8, 9, 12, 2000};
-  views[1].detection.curve_costs = {5, 7};  // the second value applies to all larger gammas
-  views[2].detection.curve_costs = {-1000, -1, 0, 0.5, 100};
-  EXPECT_EQ(sum_tone_curve_costs(views), (ValuesPerGamma{2, 1001, 1003, 1006, 2002}));
 }
 
 TEST(CorrectViewsForToneCurve, CorrectsCornersFromGammaOf1p2) {

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <utility>
@@ -56,35 +55,11 @@ TEST(TouchingTags, RefinesDisplacedCorners) {
   }
 }
 
-// The reach is 0.8 of the corner squares: 9 px for squares of 12 px.
-TEST(TouchingTags, FindsCornersWithin80PercentOfSquare) {
-  const DrawnTouchingTags drawn(6);
-  const TouchingTags touching(drawn.board);
-  for (const auto& [displacement_px, is_found] : {std::pair(6.0, true), std::pair(13.0, false)}) {
-    TagDetection displaced = drawn.truth[5];
-    displaced.corners_px[2] += Eigen::Vector2d(displacement_px, 0);
-    const auto refined = touching.refine_tag_corners(displaced, drawn.levels);
-    EXPECT_EQ(refined.has_value(), is_found) << displacement_px;
-    if (!refined) continue;
-    EXPECT_THAT(refined->corners_px[2], IsNear(drawn.truth[5].corners_px[2], 0.03));
-  }
-}
-
 TEST(TouchingTags, RejectsTagWithBitsOfOtherId) {
   const DrawnTouchingTags drawn(4);
   TagDetection other = drawn.truth[5];
   other.id = 9;
   EXPECT_FALSE(TouchingTags(drawn.board).refine_tag_corners(other, drawn.levels));
-}
-
-TEST(TouchingTags, RejectsTagWithoutSaddleAtOneCorner) {
-  for (const std::size_t k : {0U, 1U, 2U, 3U}) {
-    const DrawnTouchingTags drawn(4);
-    cv::Mat1b image = drawn.levels.sharp.clone();
-    const Eigen::Vector2i at = drawn.truth[5].corners_px[k].array().round().cast<int>();
-    image(cv::Rect(at.x() - 14, at.y() - 14, 29, 29)) = 120;
-    EXPECT_FALSE(TouchingTags(drawn.board).refine_tag_corners(drawn.truth[5], smooth(image))) << k;
-  }
 }
 
 TEST(TouchingTags, FindsAllTagsFromOneTag) {
@@ -105,29 +80,6 @@ TEST(TouchingTags, FindsAllTagsFromOneTag) {
       }
     }
   }
-}
-
-TEST(TouchingTags, FindsTagsFromTagThatCannotBeRefined) {
-  const DrawnTouchingTags drawn(4);
-  cv::Mat1b image = drawn.levels.sharp.clone();
-  const Eigen::Vector2i at = drawn.truth[0].corners_px[0].array().round().cast<int>();
-  image(cv::Rect(at.x() - 3, at.y() - 3, 7, 7)) = 120;
-  const auto found =
-      TouchingTags(drawn.board).refine_and_complete_tags({drawn.truth[0]}, smooth(image));
-  EXPECT_EQ(found.tags.size(), drawn.truth.size() - 1);
-  EXPECT_EQ(std::ranges::find(found.tags, drawn.truth[0].id, &TagDetection::id), found.tags.end());
-  ASSERT_EQ(found.rejected_predictions.size(), 1U);
-  EXPECT_EQ(found.rejected_predictions[0].id, drawn.truth[0].id);
-}
-
-/// The wrong tag has the id of another one, which is next to most tags of the board.
-TEST(TouchingTags, FindsAllTagsIfOneTagHasWrongId) {
-  const DrawnTouchingTags drawn(4);
-  TagDetection wrong = drawn.truth[11];
-  wrong.id = drawn.truth[5].id;
-  const auto found =
-      TouchingTags(drawn.board).refine_and_complete_tags({drawn.truth[0], wrong}, drawn.levels);
-  EXPECT_EQ(found.tags.size(), drawn.truth.size());
 }
 
 /// The bits of the tag are covered; its corners and its neighbors are visible.
@@ -246,48 +198,6 @@ TEST(SquareCorners, DetectsCornersNearDisplacedMarkers) {
       EXPECT_THAT(points[i].pixel, IsNear(drawn.corner_px(i), 0.03)) << i;
     }
   }
-}
-
-// The margin of a marker is an eighth of a square, 6 px. The reach is 80 % of its diagonal, and the
-// saddle is fitted up to 2 px beyond.
-TEST(SquareCorners, SearchesCornersWithin80PercentOfDiagonalOfMargin) {
-  const DrawnSquares drawn(48);
-  for (const auto& [displacement_px, num_points] : {std::pair(7.0, 35U), std::pair(9.5, 0U)}) {
-    auto markers = drawn.markers;
-    for (TagDetection& marker : markers) {
-      for (auto& corner : marker.corners_px) corner.x() += displacement_px;
-    }
-    EXPECT_EQ(drawn.detect(markers).size(), num_points) << displacement_px;
-  }
-}
-
-// A marker is in the square next to a corner, half a diagonal (0.71 squares) away.
-TEST(SquareCorners, DetectsOnlyCornersOfSquareOfSingleMarker) {
-  const DrawnSquares drawn(30);
-  const std::size_t marker = 7;
-  const Eigen::Vector2d middle_px =
-      (drawn.markers[marker].corners_px[0] + drawn.markers[marker].corners_px[2]) / 2;
-  const auto points = drawn.detect({drawn.markers[marker]});
-  ASSERT_EQ(points.size(), 4U);
-  for (const PointDetection& point : points) {
-    EXPECT_THAT(point.pixel, IsNear(drawn.corner_px(point.index), 0.03));
-    EXPECT_NEAR((point.pixel - middle_px).norm(), 30 * std::numbers::sqrt2 / 2, 0.1);
-  }
-  EXPECT_TRUE(drawn.detect({}).empty());
-}
-
-// Homographies of adjacent markers must map their corners within a quarter of a square.
-TEST(SquareCorners, RejectsCornersNearMarkersThatContradictOnePlane) {
-  const DrawnSquares drawn(40);
-  const auto count = [&](double displacement_px) {
-    auto markers = drawn.markers;
-    for (std::size_t i = 0; i < markers.size(); i += 2) {
-      for (auto& corner : markers[i].corners_px) corner.x() += displacement_px;
-    }
-    return drawn.detect(markers).size();
-  };
-  EXPECT_EQ(count(4), 35U);
-  EXPECT_LT(count(60), 10U);
 }
 
 // Corners nearer than 2 px to the image border are rejected.
