@@ -156,18 +156,6 @@ TEST(FitRimOfLight, CenterIsUnbiasedNextToSaturatedWalls) {
   }
 }
 
-TEST(FitRimOfLight, DetectsClearRimOfLargeDownlights) {
-  for (const double scale : {3.0, 7.0}) {
-    DrawnLamp lamp = downlight(0.7, 40);
-    lamp.center *= scale, lamp.radius_px *= scale;
-    lamp.recess->core_off_px *= scale, lamp.recess->core_px *= scale, lamp.recess->halo_px *= scale;
-    const cv::Size size(int(scale * kSize.width), int(scale * kSize.height));
-    const auto rim = rim_in(render_lamps({lamp}, size, CV_8U, 1), lamp.stripes.period_lines);
-    ASSERT_TRUE(rim) << scale;
-    EXPECT_LT((rim->pixel - lamp.center).norm(), 0.5) << scale;
-  }
-}
-
 TEST(LightDetector, IdentifiesDownlightsOnlyWithReliableNumberOfPeriods) {
   int identified = 0;
   for_each_downlight([&](const DrawnLamp& lamp, int depth, double noise, std::uint64_t seed) {
@@ -188,58 +176,6 @@ TEST(LightDetector, IdentifiesDownlightsOnlyWithReliableNumberOfPeriods) {
     EXPECT_LT((lights[0].pixel - lamp.center).norm(), 1);
   });
   EXPECT_GT(identified, 0);
-}
-
-/// The edge of a source and the rim around it are two circles.
-TEST(FitRimOfLight, RadiusIsInKnownRange) {
-  const Vector2d center(151.3, 139.6), source(146.2, 142.9);
-  cv::Mat1b image(kSize);
-  for (int row = 0; row < image.rows; ++row) {
-    for (int column = 0; column < image.cols; ++column) {
-      const Vector2d pixel(column, row);
-      const auto cover = [&](const Vector2d& middle, double radius_px) {
-        return std::clamp(0.5 + radius_px - (pixel - middle).norm(), 0.0, 1.0);
-      };
-      const double lit = (row / 9) % 2 == 0 ? 1 : 0;
-      image(row, column) = cv::saturate_cast<std::uint8_t>(
-          8 + lit * (24 * cover(center, 50.7) + 190 * cover(source, 27)));
-    }
-  }
-  const auto rim = rim_in(image, 18, KnownRadius{50.7 / 520, 0.07});
-  ASSERT_TRUE(rim);
-  EXPECT_NEAR(rim->radius_px, 50.7, 1);
-  EXPECT_LT((rim->pixel - center).norm(), 0.5);
-  const auto edge_of_source = rim_in(image, 18, KnownRadius{27.0 / 520, 0.07});
-  ASSERT_TRUE(edge_of_source);
-  EXPECT_NEAR(edge_of_source->radius_px, 27, 1);
-  const auto other = rim_in(image, 18, KnownRadius{37.0 / 520, 0.04});
-  EXPECT_FALSE(other);
-}
-
-TEST(FitRimOfLight, ReportsNoClearRimForGlows) {
-  for (const double period : {9.0, 14.5, 22.0}) {
-    for (const double noise : {0.0, 0.5, 1.5}) {
-      const DrawnLamp glow{
-          .center = {151.3, 139.6}, .stripes = {.period_lines = period}, .glow = DrawnGlow()};
-      const auto rim = rim_in(render_lamps({glow}, kSize, CV_8U, noise), period);
-      EXPECT_FALSE(rim) << period << " lines, noise " << noise;
-    }
-  }
-}
-
-TEST(FitRimOfLight, ReturnsClearRimWithCenterOfDisc) {
-  const DrawnLamp disc{.center = {151.3, 139.6}, .radius_px = 50.7};
-  const auto rim = rim_in(render_lamps({disc}, kSize, CV_8U, 1), 0);
-  ASSERT_TRUE(rim);
-  EXPECT_LT((rim->pixel - disc.center).norm(), 0.2);
-  EXPECT_EQ(rim->outline.size(), 64U);
-  for (const Eigen::Vector2d& at : rim->outline)
-    EXPECT_NEAR((at - disc.center).norm(), disc.radius_px, 0.5);
-}
-
-TEST(FitRimOfLight, ReturnsNulloptForSmallBlob) {
-  const DrawnLamp speck{.center = {151.3, 139.6}, .radius_px = 8};
-  EXPECT_FALSE(rim_in(render_lamps({speck}, kSize, CV_8U), 0));
 }
 
 }  // namespace

@@ -98,40 +98,6 @@ TEST(Shear, ReducesCenterErrorOfPartialOutline) {
   EXPECT_LT(chi_square, 1.3);
 }
 
-TEST(Shear, EstimateReturnsNulloptForStationaryCamera) {
-  Random random(3);
-  MovingCamera moving_camera;
-  moving_camera.v.setZero();
-  moving_camera.w = 0;
-  int found = 0;
-  for (int trial = 0; trial < 300; ++trial) {
-    found += Shear::estimate_shear_from_outlines(three_whole(moving_camera, random)).has_value();
-  }
-  EXPECT_EQ(found, 0);
-}
-
-TEST(Shear, EstimateRecognizesMotionIfOvalsAgreeBetterThanStated) {
-  // The variances that a shear inflates: the ovals are significant only by their agreement.
-  constexpr double inflation = 400;
-  Random random(5);
-  const MovingCamera moving_camera;
-  auto lights = three_whole(moving_camera, random);
-  for (const Vector2d& at : {Vector2d(0.3, 0.2), {-0.3, -0.3}})
-    lights.push_back(moving_camera.make_outline(at, 2 * pi, random));
-  double significance = 0;
-  for (OutlineEquations& light : lights) {
-    const auto estimate = light.solve_with_oval_prior(std::nullopt);
-    ASSERT_TRUE(estimate);
-    const double per_light =
-        estimate->p.tail<2>().squaredNorm() / (estimate->covariance(3, 3) * inflation);
-    significance += per_light;
-    light.matrix /= inflation;
-    light.gradient /= inflation;
-  }
-  ASSERT_GT(significance, 15) << significance;
-  EXPECT_TRUE(Shear::estimate_shear_from_outlines(lights)) << significance;
-}
-
 TEST(Shear, EstimateIgnoresLightWithContradictingMotion) {
   Random random(4);
   const MovingCamera moving_camera;
@@ -144,15 +110,6 @@ TEST(Shear, EstimateIgnoresLightWithContradictingMotion) {
   const Vector2d motion = moving_camera.motion_at({-0.4, 0.2});
   EXPECT_THAT(shear->predict_oval_from_motion(lights[1]).oval,
               IsNear(300 * Vector2d(-motion.y(), motion.x()), 5e-4));
-}
-
-TEST(Shear, EstimateReturnsNulloptWithoutUsableLights) {
-  EXPECT_FALSE(Shear::estimate_shear_from_outlines({}));
-  // Three points of an outline do not determine the motion.
-  const Points points{{1, 0}, {0, 1}, {-1, 0}};
-  const OutlineEquations few = make_outline_equations(points, {{0, 0}, 1}, kLineSlope, 1);
-  EXPECT_FALSE(few.solve_with_oval_prior(std::nullopt));
-  EXPECT_FALSE(Shear::estimate_shear_from_outlines(std::vector{few}));
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "lamps/signal/square_wave.h"
@@ -124,20 +123,6 @@ TEST(LampClassifier, AcceptsUnclearStripesOnlyCloseToTrainedLamp) {
   EXPECT_EQ(identify_lamp_by_classifier(classifier, stripes), 7);
 }
 
-TEST(FitLampClassifier, ReturnsSameClassifierForReversedOrderOfLights) {
-  auto lights = make_lights(kLamps, 20, 1);
-  const LampClassifier a = fit_lamp_classifier(lights);
-  std::reverse(lights.begin(), lights.end());
-  const LampClassifier b = fit_lamp_classifier(lights);
-  ASSERT_EQ(a.lamps.size(), 3);
-  ASSERT_EQ(b.lamps.size(), 3);
-  EXPECT_TRUE(a.covariance.isApprox(b.covariance, 1e-9));
-  for (std::size_t i = 0; i < 3; ++i) {
-    EXPECT_EQ(a.lamps[i].examples, b.lamps[i].examples);
-    EXPECT_TRUE(a.lamps[i].center.isApprox(b.lamps[i].center, 1e-9));
-  }
-}
-
 TEST(CrossValidateLampClassifier, CountsEachLightOnce) {
   const ConfusionMatrix confusion =
       cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), fit_lamp_classifier);
@@ -155,47 +140,6 @@ TEST(CrossValidateLampClassifier, ExcludesHeldOutImagesFromTraining) {
   const ConfusionMatrix confusion = cross_validate_lamp_classifier(lights, fit_lamp_classifier);
   EXPECT_EQ(confusion.counts(2, 2), 0);
   EXPECT_EQ(confusion.counts(2, 3), 8);
-}
-
-TEST(CrossValidateLampClassifier, MisidentifiesLampsWhenTrainingFunctionSwapsThem) {
-  const auto mistaken = [](std::span<const LabeledLight> lights) {
-    LampClassifier classifier = fit_lamp_classifier(lights);
-    std::swap(classifier.lamps.front().lamp, classifier.lamps.back().lamp);
-    return classifier;
-  };
-  const ConfusionMatrix confusion =
-      cross_validate_lamp_classifier(make_lights(kLamps, 40, 1), mistaken);
-  EXPECT_GE(confusion.count_wrongly_identified_lights(), 78);
-}
-
-TEST(ComputeStripeFeaturesForClassifier, ReturnsLogPeriodLitAreaDutyAndStripesPerLine) {
-  Stripes stripes{};
-  stripes.period_lines = 12;
-  stripes.duty = 0.4;
-  stripes.count_per_line = 0.08;
-  stripes.lit_area = 0.45;
-  EXPECT_EQ(compute_stripe_features_for_classifier(stripes),
-            LampFeatures(std::log(12), 0.4, 0.08, 0.45));
-  EXPECT_EQ(kLampFeatures[0], "log_period_lines");
-}
-
-TEST(ComputeStripeFeaturesForClassifier, MeanFeaturesAreIndependentOfNumberOfScanlines) {
-  Random random(7);
-  for (const int lines : {60, 90, 120, 180}) {
-    for (const double duty : {0.35, 0.6}) {
-      LampFeatures mean = LampFeatures::Zero();
-      constexpr int draws = 100;
-      for (int draw = 0; draw < draws; ++draw) {
-        mean += compute_stripe_features_for_classifier(
-                    measure_stripes(noisy_square_wave(lines, 10.3, duty, 1, 0, random))) /
-                draws;
-      }
-      EXPECT_NEAR(mean[0], std::log(10.3), 0.005);
-      EXPECT_NEAR(mean[1], duty, 0.03);
-      EXPECT_NEAR(mean[2], 1 / 10.3, 0.05 / 10.3);
-      EXPECT_NEAR(mean[3], duty, 0.03);
-    }
-  }
 }
 
 }  // namespace

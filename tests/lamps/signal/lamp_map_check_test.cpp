@@ -45,17 +45,6 @@ TEST(PredictRelativePeriodSd, CoversErrorsOfMeasuredPeriods) {
   }
 }
 
-TEST(PredictRelativePeriodSd, CoversErrorsOfMeasuredIntegerPeriods) {
-  for (const double period : {5.0, 14.0}) {
-    EXPECT_LT(measured_over_stated(period, 60, 0.02), 1.1);
-    EXPECT_LT(measured_over_stated(period, 60, 1.67), 1.1);
-  }
-}
-
-TEST(PredictRelativePeriodSd, ReturnsInfinityForTooFewPeriods) {
-  EXPECT_EQ(predict_relative_period_sd(40, 50, 1), std::numeric_limits<double>::infinity());
-}
-
 TEST(CountScanlinesOnLamp, ReturnsScanlinesOrNulloptForUnknownSizeOrLampBelowCamera) {
   EXPECT_NEAR(count_scanlines_on_lamp(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
   Lamp unknown = lamp(1, 2000);

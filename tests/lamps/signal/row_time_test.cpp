@@ -76,18 +76,6 @@ TEST(EstimateRowTimeCandidates, IntervalOf95PercentCoversRowTimeForEachNumberOfL
   }
 }
 
-TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteOneWrongLampFrequency) {
-  // Periods measured in a photograph of real lamps: the first has an error of 4.4 %.
-  std::vector<MeasuredPeriod> lights;
-  for (const double frequency_hz : {2089.0, 2511.0, 3006.0, 3533.0, 4014.0}) {
-    lights.push_back({1 / (frequency_hz * kTrue_s), {}});
-  }
-  const auto result = find_row_time(lights, kMap);
-  ASSERT_TRUE(result.row_time) << result.problem;
-  EXPECT_NEAR(result.row_time->row_time_s / kTrue_s, 1, 0.006);
-  EXPECT_LT(std::abs(result.row_time->row_time_s - kTrue_s), 3 * result.row_time->sd_s);
-}
-
 TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteLightsMissingInMap) {
   Random random(3);
   std::vector<MeasuredPeriod> lights;
@@ -98,14 +86,6 @@ TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteLightsMissingInMap) {
   ASSERT_TRUE(result.row_time) << result.problem;
   EXPECT_NEAR(result.row_time->row_time_s / kTrue_s, 1, 0.001);
   EXPECT_EQ(result.row_time->lamps, 5);
-}
-
-TEST(EstimateRowTimeCandidates, ReturnsRowTimeWithoutLabelsForSingleFrequency) {
-  const auto result = find_row_time(std::vector<MeasuredPeriod>{{1 / (2500 * kTrue_s), {}}},
-                                    make_lamp_map({2500, 2500}));
-  ASSERT_TRUE(result.row_time) << result.problem;
-  EXPECT_NEAR(result.row_time->row_time_s, kTrue_s, 1e-12);
-  EXPECT_EQ(result.row_time->lamps, 1);
 }
 
 void expect_ambiguous(const std::vector<double>& seen_hz, const LampMap& map) {
@@ -196,18 +176,6 @@ TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByLabels) {
   const auto result = find_row_time(lights, even);
   ASSERT_TRUE(result.row_time) << result.problem;
   EXPECT_NEAR(result.row_time->row_time_s, kTrue_s, 1e-12);
-}
-
-TEST(SelectRowTimeCandidate, ReturnsProblemWithoutMatchingLights) {
-  EXPECT_THAT(find_row_time({}, kMap).problem, HasSubstr("no light has clear stripes"));
-  EXPECT_THAT(find_row_time(std::vector<MeasuredPeriod>{{10, 77}}, kMap).problem,
-              HasSubstr("no lamp of the map"));
-  // Periods of random lights.
-  std::vector<MeasuredPeriod> lights;
-  for (const double period : {5.0, 7.3, 11.9, 19.1, 30.7, 46.0}) lights.push_back({period, {}});
-  const auto result = find_row_time(lights, make_lamp_map({2000, 2200}));
-  EXPECT_FALSE(result.row_time);
-  EXPECT_NE(result.problem, "");
 }
 
 TEST(GroupLightsByLampOrPeriod, GroupsRepeatedPeriodsAndIgnoresSingleOnes) {

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "support/random.h"
 
@@ -81,18 +80,6 @@ TEST_P(MeasureStripesOfSquareWave, ReturnsPeriodWhenExposureBlursStripes) {
 INSTANTIATE_TEST_SUITE_P(Periods, MeasureStripesOfSquareWave,
                          testing::Values(5, 6.3, 8, 10.7, 13.3, 17.9, 25));
 
-TEST(MeasureStripes, ReturnsPeriodAndPeriodicityOfSine) {
-  for (const double period : {2.5, 4.0, 7.3, 20.0}) {
-    std::vector<double> signal;
-    for (int line = 0; line < 50; ++line) {
-      signal.push_back(100 + 80 * std::sin(2 * std::numbers::pi * line / period));
-    }
-    const Stripes stripes = measure_stripes(signal);
-    EXPECT_NEAR(stripes.period_lines, period, 0.01 * period);
-    EXPECT_GT(stripes.periodicity_r2, 0.96);
-  }
-}
-
 TEST(MeasureStripes, ReturnsPeriodAndDutyInNoise) {
   Random random(4);
   for (int draw = 0; draw < 100; ++draw) {
@@ -113,62 +100,6 @@ TEST(MeasureStripes, ReturnsLowContrastAndPeriodicityForSteadyLight) {
     EXPECT_LT(stripes.contrast, 0.1);
     EXPECT_LT(stripes.periodicity_r2, 0.5);
   }
-}
-
-void expect_no_stripes(const std::vector<double>& signal) {
-  const Stripes stripes = measure_stripes(signal);
-  EXPECT_EQ(stripes.contrast, 0);
-  EXPECT_EQ(stripes.periodicity_r2, 0);
-  EXPECT_TRUE(std::isfinite(stripes.period_lines) && std::isfinite(stripes.periods));
-  EXPECT_TRUE(stripes.duty >= 0 && stripes.duty <= 1) << stripes.duty;
-}
-
-TEST(MeasureStripes, ReturnsNoStripesForShortSignals) {
-  for (int lines = 0; lines < 8; ++lines) expect_no_stripes(square_wave(lines, 4, 0.5, 0));
-  EXPECT_GT(measure_stripes(square_wave(8, 4, 0.5, 0)).contrast, 0.5);
-}
-
-TEST(MeasureStripes, ReturnsNoStripesForConstantSignals) {
-  for (const double level : {0.0, 1e-3, 0.1, 100.1, 200.0 / 3, -5.0}) {
-    for (const std::size_t lines : {8U, 41U, 60U, 67U}) {
-      SCOPED_TRACE(testing::Message() << level << ", " << lines);
-      const Stripes stripes = measure_stripes(std::vector<double>(lines, level));
-      EXPECT_EQ(stripes.contrast, 0);
-      EXPECT_LT(stripes.periodicity_r2, 0.5);
-      EXPECT_TRUE(stripes.duty >= 0 && stripes.duty <= 1) << stripes.duty;
-    }
-  }
-}
-
-TEST(MeasureStripes, ReturnsFiniteDutyForSignalWithOneOutlier) {
-  // The darkest and brightest lines are excluded, and the others are constant.
-  for (const double odd : {0.0, 300.0}) {
-    std::vector<double> signal(60, 100);
-    signal[20] = odd;
-    const Stripes stripes = measure_stripes(signal);
-    EXPECT_EQ(stripes.contrast, 0);
-    EXPECT_TRUE(std::isfinite(stripes.duty));
-  }
-}
-
-TEST(MeasureStripes, CountPerLineAveragesBeginsAndEndsOfStripes) {
-  // 60 lines, lit from 5 to 9, 15 to 19 and so on: six begins, five or six ends.
-  std::vector<double> signal(60, 0);
-  for (std::size_t i = 0; i < signal.size(); ++i) signal[i] = i % 10 >= 5 ? 100 : 0;
-  EXPECT_NEAR(measure_stripes(signal).count_per_line, 11.0 / 2 / 60, 1e-12);
-}
-
-TEST(MeasureStripes, LitAreaMatchesLitFractionOfDiscArea) {
-  // The upper half is lit, then the half in the middle, where the chords are longer.
-  std::vector<double> half(80, 0), middle(80, 0);
-  for (std::size_t i = 0; i < 80; ++i) {
-    half[i] = i < 40 ? 100 : 0;
-    middle[i] = i >= 20 && i < 60 ? 100 : 0;
-  }
-  EXPECT_NEAR(measure_stripes(half).lit_area, 0.5, 1e-12);
-  // Area of the chords sqrt(1 - y^2) for |y| < 0.45, divided by that for |y| < 0.9.
-  const auto area = [](double y) { return y * std::sqrt(1 - y * y) + std::asin(y); };
-  EXPECT_NEAR(measure_stripes(middle).lit_area, area(0.45) / area(0.9), 1e-3);
 }
 
 }  // namespace
