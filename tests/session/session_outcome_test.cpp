@@ -194,8 +194,9 @@ TEST_F(RunCalibrationSession, GivenCameraTakesPrecedenceOverOptions) {
     EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
     const auto& warnings = find_step(result, "lens").result.warnings;
     ASSERT_EQ(warnings.size(), *ignored == '\0' ? 0U : 1U) << ignored;
-    if (!warnings.empty())
+    if (!warnings.empty()) {
       EXPECT_THAT(warnings[0], testing::EndsWith(std::string("ignored: ") + ignored));
+    }
   }
 }
 
