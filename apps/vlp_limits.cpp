@@ -66,8 +66,8 @@ UnitErrors make_reported_errors(const Options& options, const LampMap& lamps,
     unstated.append(unstated.empty() ? "" : ", ").append(names[i]);
   }
   if (!unstated.empty()) {
-    // [GATE-4] `count as zero` | calibration without covariances, map without `sd_m`: order of
-    //   `vlp-limits --from-calibration` may be wrong | state them
+    // [GATE-4] `count as zero` | no covariances in the calibration, no `sd_m` in the map | state
+    //   them
     spdlog::warn("{}: the uncertainties are missing and count as zero", unstated);
   }
   if (const int elsewhere = unit.common_errors().num_lamps_moved_since_calibration();

@@ -71,7 +71,7 @@ struct CsvParsing {
     if (!in_header) table.lines_.push_back(row_line);
     if (row_fields != table.header_.size() && !error) {
       // [FILE-4] `cut short` | file written incompletely or edited; decimal comma in a table |
-      //   write or copy it again
+      //   write it again
       error = InputError(table.file_, row_line, "",
                          "has " + std::to_string(row_fields) + " fields, the header has " +
                              std::to_string(table.header_.size()) + ": is the row cut short?");

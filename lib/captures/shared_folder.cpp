@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 constexpr int kFolderFlags = O_RDONLY | O_DIRECTORY | O_CLOEXEC;
 // [STATION-13] `is not followed` | link, pipe or device in `captures`, `results`, `spool` or
-//   `.state`, where others can write; folders of `station.yaml` and `-o` may be links | remove it
+//   `.state`, where others can write | remove it
 constexpr const char* kLink =
     "is a symbolic link, which is not followed in a folder that others can write to: remove it if "
     "it is not yours, otherwise use a bind mount";

@@ -37,8 +37,8 @@ std::string make_errors_below_crlb_warning(const Evaluation& evaluation) {
   const auto& limit = evaluation.crlb_ratio;
   if (!limit || !limit->are_errors_below_crlb()) return "";
   constexpr int digits = 3;
-  // [GATE-3] `limit: either` | smaller noise than `--noise-px`, or fixes from more than one level
-  //   image | check `--noise-px`
+  // [GATE-3] `limit: either` | less noise than `--noise-px`, or fixes of several images | check
+  //   `--noise-px`
   return "the errors are " + format_significant_digits(limit->horizontal, digits) +
          " times the theoretical limit: either the stated pixel noise is too large, or the fixes "
          "use more information than one image of a level camera with completely visible lamps "
@@ -49,8 +49,7 @@ std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation)
   std::vector<std::string> warnings;
   const std::string& resampling_unit = evaluation.resampling_unit;
   if (const auto& intervals = evaluation.intervals_m; !intervals) {
-    // [GATE-2] `for intervals`, `too narrow` | fewer than 20 independent reference points or
-    //   captures | measure more
+    // [GATE-2] `for intervals`, `too narrow` | fewer than 20 independent captures | measure more
     warnings.push_back("there are too few " + resampling_unit + " with a fix for intervals");
   } else if (intervals->clusters <
              (evaluation.reference == "truth" ? kSufficientClusters : kPathRuns)) {

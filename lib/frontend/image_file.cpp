@@ -236,8 +236,8 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   // Other formats are rejected, because the memory that they need is unknown before decoding.
   const auto size = read_image_size_from_header(bytes);
   if (!size) {
-    // [FILE-7] `cannot be read as an image` | damaged, raw, or of another format; the content
-    //   counts, not the name. Other images are used. | save in a listed format
+    // [FILE-7] `cannot be read as an image` | damaged, raw, or of another format; other images are
+    //   used | save in a listed format
     throw InputError(
         file, has_image_signature(bytes)
                   ? "cannot be read as an image: it is cut short or damaged"

@@ -105,7 +105,7 @@ LampClassifier read_classifier(const LampImages& images, const fs::path& file,
   for (const auto& lamp : classifier.lamps) {
     if (find_lamp_by_id(images.lamps.lamps, lamp.lamp) != nullptr) continue;
     // [FILE-6] `is not in`, `is unknown to` | files of different rooms or captures | give files of
-    //   the same room and captures
+    //   the same
     throw InputError(file,
                      fmt::format("lamp {} is not in {}", lamp.lamp, images.lamps_file.string()));
   }
@@ -151,8 +151,8 @@ void warn_about_map(const LampImages& images, const DetectorCamera& camera,
         "{:.1f} % are needed; change one of the frequencies, or a duty by 0.3",
         first, second, 100 * gap, 100 * needed));
   }
-  // [LAMP-11] `too near`, `too fine to be seen` | frequencies too close, too high or too low for
-  //   row time and exposure | see [frequencies](ROOM.md#lamps)
+  // [LAMP-11] `too near`, `too fine to be seen` | frequencies unsuitable for row time and exposure
+  //   | see [frequencies](ROOM.md#lamps)
   warn_about_other_findings(alike.size(), "pairs of lamps with frequencies that are too near",
                             warnings);
   const auto unreadable = find_lamps_with_unreadable_period(images.lamps, conditions);
@@ -199,8 +199,8 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
   const auto skipped = std::count_if(images.begin(), images.end(), [](const Observation& image) {
     return !image.is_image_kept();
   });
-  // [LAMP-1] `no lamp was identified wholly in view` | lights unlike any lamp: wrong row time,
-  //   readout or map; steady or cut lamps | see the most frequent reason below
+  // [LAMP-1] `no lamp was identified wholly in view` | wrong row time, readout or map; steady or
+  //   cut lamps | see the most frequent reason below
   std::string message = fmt::format(
       "no lamp was identified wholly in view in {} images ({} skipped; {} lamps are cut by the "
       "image's edge, {} lights flicker unlike any lamp of the map, {} are steady, {} have no form)",
@@ -416,7 +416,7 @@ Readout estimate_readout_direction(const std::vector<fs::path>& images,
   });
   if (!found) {
     // [LAMP-12] `readout is not stated` | readout estimated, or rows assumed; some images rotated,
-    //   as of a phone. A wrong readout identifies no lamp. | `--readout`
+    //   as of a phone | `--readout`
     result.warnings.emplace_back(
         "the readout is not stated and not visible in the images: rows are assumed; give "
         "--readout");

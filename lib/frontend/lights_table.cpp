@@ -86,22 +86,22 @@ std::string_view light_reason_name(LightReason reason) {
       {{LightReason::identified, "identified"},
        // [LAMP-2] `overexposed` | most pixels of the light at full scale | expose shorter
        {LightReason::overexposed, "overexposed"},
-       // [LAMP-3] `steady` | not modulated, or exposure too long for the frequency | expose shorter
+       // [LAMP-3] `steady` | not modulated, or exposure too long | expose shorter
        {LightReason::unmodulated, "steady"},
-       // [LAMP-4] `too_few_periods` | too small, too far or too slow; few periods suffice only next
-       //   to a lamp with more | go nearer, or raise the frequency
+       // [LAMP-4] `too_few_periods` | too small, too far or too slow | go nearer, or raise the
+       //   frequency
        {LightReason::too_few_periods, "too_few_periods"},
        // [LAMP-5] `no_clear_period` | object, letters or pattern in front, or wrong readout |
        //   `--readout`
        {LightReason::no_clear_period, "no_clear_period"},
        // [LAMP-6] `unknown_period` | wrong frequency, row time, readout or classifier; or a light
-       //   outside the map, such as one dimmed by PWM | correct the wrong value
+       //   outside the map | correct the wrong value
        {LightReason::unknown_period, "unknown_period"},
        // [LAMP-7] `reflection` | mirror image; lamp out of focus, or less than twice as large and
        //   bright as its mirror image; two lamps of one frequency | focus, cover the mirror,
        //   separate the frequencies
        {LightReason::reflection, "reflection"},
-       // [LAMP-8] `wrong_shape` | lamp partly covered or touched by another light; other shape or
+       // [LAMP-8] `wrong_shape` | lamp partly covered or touched by another light; wrong shape or
        //   size in the map | uncover it, or correct the map
        {LightReason::wrong_shape, "wrong_shape"},
        // [LAMP-9] `incomplete` | not wholly in view, or too small | aim at it, or go nearer

@@ -222,7 +222,7 @@ void Selection::add_image_or_reject_as_repeated(Observation& image) {
   for (const Kept& kept : kept_) {
     if (!are_points_equal(points, kept.points)) continue;
     // [FILE-10] `the same image`, `the same view` | copy, or view within 1 % of the image width of
-    //   another; counts once | move the board, or rotate the camera
+    //   another | move the board, or rotate the camera
     return image.set_image_rejection(RejectionReason::same_image,
                                      "is the same image as " + kept.name);
   }

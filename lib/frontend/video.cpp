@@ -59,8 +59,8 @@ Video::Video(const std::string& source, const std::optional<std::array<int, 2>>&
   VideoReader& video = *capture_->reader;
   if (!video.open_video(source, is_live_camera() ? cv::CAP_V4L2 : file_api)) {
     // [FILE-1]
-    // [FILE-8] `cannot be opened as a video` | codec missing in OpenCV, or end missing (an MP4 that
-    //   was not closed) | record or convert again
+    // [FILE-8] `cannot be opened as a video` | codec missing in OpenCV, or end missing (MP4 not
+    //   closed) | record or convert again
     throw InputError(source, is_live_camera()
                                  ? "cannot be opened as a camera"
                                  : "cannot be opened as a video: is it cut short, or none?");

@@ -93,8 +93,8 @@ std::string describe_bytes(std::size_t bytes) {
 /// size; 0 for a stream.
 std::size_t check_file_kind(const fs::path& path, int descriptor, std::size_t max_bytes) {
   struct stat status {};
-  // [FILE-1] `cannot be read` | system error, stated at the end; stdout: its reader ended | correct
-  //   path or permission, free space
+  // [FILE-1] `cannot be read` | system error, stated at the end | correct path or permission, free
+  //   space
   if (::fstat(descriptor, &status) != 0) throw InputError(path, "cannot be read");
   if (S_ISDIR(status.st_mode)) throw InputError(path, "is a folder, not a file");
   if (!S_ISREG(status.st_mode)) {

@@ -243,7 +243,7 @@ double YamlValue::read_number(const Range& range) const {
   if (value < range.min || value > range.max) {
     const std::string unit(range.unit);
     // [FILE-3] `is it in the right unit?` | mm, us or degrees in place of m, s or rad; national
-    //   coordinates with too many digits | convert
+    //   coordinates | convert
     throw make_error(format_shortest_exact_number(value) + " " + unit + " is not within " +
                      format_shortest_exact_number(range.min) + " and " +
                      format_shortest_exact_number(range.max) + " " + unit +

@@ -566,8 +566,7 @@ void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
     }
   }
   if (rejected > 0) {
-    // [FIX-10] `the others, rejected`, `is rejected in` | lamps misidentified. Displaced lamps are
-    //   listed with their offset instead. | check these lamps
+    // [FIX-10] `the others, rejected`, `is rejected in` | lamps misidentified | check these lamps
     result.warnings.push_back(
         fmt::format("{} detections that contradict the others, rejected", rejected));
   }
@@ -608,8 +607,8 @@ LocateResult locate_camera_from_detections(const LocateInput& input) {
   if (input.compute_lamp_offsets) {
     result.lamp_offsets = std::move(map_errors.offsets);
     if (input.frames.size() > 1 && result.lamp_offsets.empty()) {
-      // [FIX-13] `not tie all lamps` | note: lamps never visible next to two others; their
-      //   displacement is undetectable | captures between them
+      // [FIX-13] `not tie all lamps` | note: lamps never visible next to two others | captures
+      //   between them
       result.notes.push_back(
           "relative lamp positions are not checked: captures do not tie all lamps together");
     }

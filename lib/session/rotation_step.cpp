@@ -131,8 +131,8 @@ void add_warnings(RotationResult& result) {
   constexpr double max_noise_ratio = 3;
   const auto& median_sigma_px = result.rotation.median_sigma_px;
   if (median_sigma_px && result.fit.residual_px > max_noise_ratio * *median_sigma_px) {
-    // [ROTATION-1] `the residuals ` | above the stated noise: lens or map inaccurate, camera beside
-    //   the axis, or `sigma_px` too small | check lens, map and `sigma_px`
+    // [ROTATION-1] `the residuals ` | lens or map inaccurate, camera beside the axis, or `sigma_px`
+    //   too small | check lens, map and `sigma_px`
     result.warnings.push_back(
         fmt::format("the residuals correspond to {:.2g} px of noise, {:.2g} px are stated: is the "
                     "lens calibrated, the camera off the axis, the method exact?",

@@ -140,8 +140,8 @@ std::string describe_row_time_contradiction(const RowTime& measured, const Given
       compute_row_time_error_fraction(measured, given.row_time_s) <= kLampDrift) {
     return "";
   }
-  // [LAMP-13] `row time is ... us in` | contradicts the frequencies of the map by more than 1.5 %
-  //   and three standard deviations | use the measured one, if the frequencies are right
+  // [LAMP-13] `row time is ... us in` | contradicts the frequencies of the map | use the measured
+  //   one, if the frequencies are right
   return fmt::format(
       "row time is {:.6g} us in {}, but the stripes of {} lamps measure {:.2f} +- {:.2f} us; "
       "correct it, or, if it is right, all frequencies of the lamp map by this ratio",

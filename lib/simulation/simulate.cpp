@@ -101,8 +101,7 @@ void add_brightness_warnings(const Scene& scene, const CaptureSet& set, const st
   const double high = compute_level(scene, set, bright_e_per_s);
   const double low = compute_level(scene, set, dark_e_per_s);
   if (high - low < too_dark * white) {
-    // [GATE-5] `gray levels` | `vlp-simulate`: images too dark, too bright or empty; rendered
-    //   anyway | change light or exposure
+    // [GATE-5] `gray levels` | images too dark, too bright or empty | change light or exposure
     warnings.push_back(set.folder + ": " + bright + " is only " + whole(high - low) + " of " +
                        whole(white) + " gray levels above " + dark + fit);
   }

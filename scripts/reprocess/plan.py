@@ -76,8 +76,7 @@ def list_sessions(archive):
     faults = []
     sessions = list_sessions_in(archive, faults)
     if not sessions:
-        # [ARCHIVE-1] `no sessions in` | ARCHIVE is a camera, a session or the folder above; earlier results are
-        #   unchanged | stated folder
+        # [ARCHIVE-1] `no sessions in` | ARCHIVE is a camera, a session or the folder above | stated folder
         fail(f"{archive}: no sessions in it; " + "; ".join([*faults, describe_wrong_level(archive) or LAYOUT]))
     if problem := check_layout(archive, sessions):
         fail(problem, INCOMPLETE)

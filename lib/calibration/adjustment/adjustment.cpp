@@ -754,8 +754,8 @@ void set_adjusted_map(const AssembledProblem& all, const LampMap& detected_lamps
   }
   add_note_of_undetected_lamps(result);
   if (contradictions.has_contradicting_majority()) {
-    // [ROTATION-3] `half the lamps or more` | `sd_m` too small, or map frame differs from that of
-    //   the known positions | correct it
+    // [ROTATION-3] `half the lamps or more` | `sd_m` too small, or other map frame than of the
+    //   known positions | correct it
     result.notes.emplace_back(
         "the captures contradict the survey of half the lamps or more: is its sd_m right?");
   }

@@ -383,8 +383,8 @@ BoardCheck check_board_layout(const Board& board, std::span<const BoardView> vie
   if (!is_pitch_consistent(fit, 1 + board.tag_spacing, tolerance)) {
     const double hundreds = 100;
     const double seen = std::round((*fit.pitch - 1) * hundreds) / hundreds;
-    // [LENS-4] `images show gaps` | wrong `tag_spacing`; strong tone curve or overexposure; far out
-    //   of focus | measure it; expose less; focus
+    // [LENS-4] `images show gaps` | wrong `tag_spacing`; strong tone curve or overexposure; out of
+    //   focus | measure it; expose less; focus
     check.problem = "tag_spacing is " + format_shortest_exact_number(board.tag_spacing) +
                     ", but the images show gaps of " + format_shortest_exact_number(seen) + " tags";
   }

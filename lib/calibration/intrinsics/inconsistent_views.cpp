@@ -91,7 +91,7 @@ std::string describe_inconsistent_views(const InconsistentViews& found,
                                     : "";
   const bool is_one = found.views.size() == 1;
   // [FILE-9] `taken by another camera?` | residuals three times those of the other images, or no
-  //   pose: other camera, or lens touched | remove these images
+  //   pose | remove these images
   return fmt::format("{} board image{} not fit the other {}: {}{}; {} taken by another camera?",
                      found.views.size(), is_one ? " does" : "s do", found.num_other_views, names,
                      residuals, is_one ? "was it" : "were they");

@@ -306,10 +306,9 @@ RowTimeResult select_row_time_candidate(const RowTimeCandidates& found,
   const auto explained = std::count_if(best.lamps.begin(), best.lamps.end(),
                                        [](const auto& lamps) { return !lamps.empty(); });
   if (2 * explained < std::ptrdiff_t(found.groups.size())) {
-    // [LAMP-14] `measured stripe periods: are`, `no row time explains` | wrong or missing lamps in
-    //   the map, or map of another room; two row times: nearly equal ratios, symmetric map, or no
-    //   image with three lamps | correct the map, state the row time, or use
-    //   `vlp-train --row-time --labels`
+    // [LAMP-14] `measured stripe periods: are`, `no row time explains` | map of another room, or
+    //   with wrong or missing lamps; two row times fit the periods | correct the map, state the row
+    //   time, or use `vlp-train --row-time --labels`
     return {{},
             "no row time explains more than " + std::to_string(explained) + " of the " + groups +
                 " measured stripe periods: are the frequencies in the lamp map right, and all "

@@ -339,8 +339,8 @@ void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
                            options.remove ? "(deleted)" : ""));
   }
   for (const auto& folder : found.folders_without_record) {
-    // [STATION-11] `records: left`, `names: left` | `clean`: folder without a run, of other
-    //   records, or with a file that the station uses | move that file elsewhere, repeat
+    // [STATION-11] `records: left`, `names: left` | folder without a run, of other records, or with
+    //   a file of the station | move that file elsewhere, repeat
     spdlog::warn("{}: belongs to no run of the records: left", folder.string());
   }
   for (const auto& folder : found.folders_in_use) {
@@ -430,9 +430,9 @@ void import_archive_sessions_as_runs(const StationRecordsOptions& options) {
                            taken, sessions.size() - taken - unread - other.size()));
   }
   if (!refused.empty()) {
-    // [STATION-14] `are not imported` | `import`: sessions without result or time, or changed;
-    //   others are taken | dates in names or `archive.csv`; delete a changed session's folder;
-    //   reprocess (`--rebuild-catalogue`)
+    // [STATION-14] `are not imported` | sessions without result or time, or changed; others are
+    //   taken | dates in names or `archive.csv`; delete a changed session's folder; reprocess
+    //   (`--rebuild-catalogue`)
     throw std::invalid_argument(fmt::format("{} sessions are not imported, the first because of {}",
                                             refused.size(), refused.front()));
   }

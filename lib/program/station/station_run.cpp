@@ -82,8 +82,8 @@ bool has_image_arrived(const Unit& unit, const std::vector<WatchedRun::ImageChan
 void check_golden_unit(Unit& unit, const Terminal& terminal) {
   std::string why = describe_golden_unit_problem(unit.station_config());
   if (!why.empty() && why != unit.invalid_verdict_reason() && !terminal.is_interactive()) {
-    // [STATION-4] `no unit passes` | station changed, or golden unit due; units are INVALID until
-    //   it passes | `vlp-station show` of its run: cause
+    // [STATION-4] `no unit passes` | station changed, or golden unit due | `vlp-station show` of
+    //   its run: cause
     spdlog::warn("{}; no unit passes", why);
   }
   unit.invalidate_verdict(std::move(why));

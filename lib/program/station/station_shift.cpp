@@ -99,8 +99,8 @@ int run_process(const std::vector<std::string>& command) {
   std::signal(SIGCHLD, SIG_DFL);  // if inherited as ignored, waitpid() returns no status
   if (const int error =
           ::posix_spawn(&process, "/proc/self/exe", nullptr, nullptr, arguments.data(), environ)) {
-    // [STATION-10] `cannot be started` | interrupted, killed or out of memory (signal 9: often
-    //   memory); no data are lost | scan the unit again: it continues
+    // [STATION-10] `cannot be started` | interrupted, killed or out of memory (signal 9) | scan the
+    //   unit again: it continues
     throw std::runtime_error("the unit's process cannot be started: " +
                              std::generic_category().message(error));
   }

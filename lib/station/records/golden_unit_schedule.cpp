@@ -165,8 +165,7 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   std::error_code none;
   if (fs::symlink_status(file, none).type() == fs::file_type::not_found) {
     // [STATION-3] `was not measured here yet` | [golden unit](vlp-station.md#golden-unit) due, or
-    //   its note not readable or not written (disk full?). A unit in progress is judged. |
-    //   `vlp-station verify`
+    //   its note not readable or written (disk full?) | `vlp-station verify`
     return fmt::format("the golden unit was not measured here yet: {}", verify);
   }
   std::string text;

@@ -280,8 +280,8 @@ bool is_hook_pending(const RunRecord& record) {
 std::string describe_pending_hook(const RunRecord& record) {
   if (!is_hook_pending(record)) return "";
   const std::ptrdiff_t failed = find_index_of_last_event_of_kind(record, kHookFailed);
-  // [STATION-9] `not run to its end` | station ended, error, or `time_limit_s` exceeded; output:
-  //   `vlp-station show RUN` | `vlp-station hook`
+  // [STATION-9] `not run to its end` | station ended, error, or `time_limit_s` exceeded |
+  //   `vlp-station show RUN`, then `vlp-station hook`
   if (failed < find_index_of_last_event_of_kind(record, kHookRequested))
     return "was not run to its end";
   return "failed: " + record.events[static_cast<std::size_t>(failed)].text;

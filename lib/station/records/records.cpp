@@ -161,8 +161,7 @@ struct Records::Database {
     if (!refused)
       throw RecordsOffline(name, "the server of the records cannot be reached: " + what);
     // [STATION-2] `answers, but refuses` | wrong user, password, database or TLS
-    //   (`sslmode=require`); runs wait for this database only | correct `records` in
-    //   `station.yaml`, or the server
+    //   (`sslmode=require`) | correct `records` in `station.yaml`, or the server
     throw RecordsRefused(
         name, "the server of the records answers, but refuses 'records' of station.yaml: " + what);
   }
@@ -377,8 +376,8 @@ void Records::store_run(const RunRecord& record, const std::string& destination)
     // Writes first, so that the transaction waits for others before it reads.
     const bool is_new = insert_run(sql, escaped.run, rows, destination, watch);
     if (!is_new && !has_stored_document(sql, escaped.run, rows.document)) {
-      // [STATION-15] `has another run` | records or results edited, or two of one name; nothing is
-      //   overwritten | compare both
+      // [STATION-15] `has another run` | records or results edited, or two of one name | compare
+      //   both
       throw InputError(database_->name, "has another run " + escaped.run);
     }
     const auto new_events = insert_events(sql, escaped, watch);

@@ -392,8 +392,7 @@ RunRecord parse_run_document(const std::string& document) {
     check_json_size_and_depth(document);
     return parse_run(Json::parse(document));
   } catch (const std::exception& error) {
-    // [STATION-12] `no run of a station` | a run of the spool or the records was edited by hand |
-    //   compare with a backup
+    // [STATION-12] `no run of a station` | run edited by hand | compare with a backup
     throw std::runtime_error(std::string("is no run of a station: ") + error.what());
   }
 }

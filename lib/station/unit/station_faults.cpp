@@ -222,10 +222,9 @@ std::optional<CommonOffset> find_common_position_offset(std::span<const Frame> f
 std::string describe_common_position_offset(const CommonOffset& offset) {
   constexpr double millimeters = 1e3;
   const Eigen::Vector2d offset_mm = millimeters * offset.offset_m;
-  // [STATION-19] `lamps have moved` | station fault: INVALID; known points or lamps moved: FAIL for
-  //   a golden unit | repair the station
-  // [STATION-18] `check are off by` | common offset. Rotating with the camera (FAIL): camera moved
-  //   since the rotation, or other camera of equal lens | repair unit or station
+  // [STATION-19] `lamps have moved` | lamps or known points moved | repair the station
+  // [STATION-18] `check are off by` | common offset; if it rotates with the camera (FAIL): camera
+  //   moved since the rotation, or other camera | repair unit or station
   return fmt::format(
       "all {} captures of the check are off by {:.1f} mm in one direction of the {} (x {:+.1f} mm, "
       "y {:+.1f} mm): {}",
@@ -255,8 +254,8 @@ std::string describe_contradiction_to_calibrated_lens(std::span<const Frame> fra
                        std::sqrt(camera.focal_px().prod()), camera.principal_point_px().x(),
                        camera.principal_point_px().y());
   };
-  // [STATION-17] `by different lenses` | INVALID: two units mixed, or lens moved between boards and
-  //   lamps | take all again; if repeated: loose lens
+  // [STATION-17] `by different lenses` | two units mixed, or lens moved between boards and lamps |
+  //   take all again; if repeated: loose lens
   return fmt::format(
       "lamps and boards are imaged by different lenses: the lamps fit {}, the boards {}; are all "
       "images of this unit, or has its lens moved?",

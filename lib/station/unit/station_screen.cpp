@@ -74,8 +74,8 @@ std::string describe_unmeasured_gates(const RunRecord& record) {
   if (names.empty()) return "";
   const auto step = find_unfinished_step(record);
   if (!step) return fmt::format("{}", fmt::join(names, ", "));
-  // [STATION-7] `did not finish` | step without result; its gates and later ones have no value |
-  //   see the causes below it
+  // [STATION-7] `did not finish` | step without result; gates without value | see the causes below
+  //   it
   return fmt::format("{} {}, because {} did not finish", names.size(),
                      names.size() == 1 ? "gate" : "gates", station_step_name(*step));
 }

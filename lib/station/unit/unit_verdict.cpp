@@ -260,8 +260,8 @@ RunRecord make_unit_run_record(const Unit& unit, const std::string& run,
 
 void invalidate_run_for_reused_images(RunRecord& record, const std::string& earlier,
                                       const std::filesystem::path& station_file) {
-  // [STATION-6] `no repetition` | images used in the stated run (INVALID and voided runs excepted)
-  //   | new images, or void that run if its serial was wrong
+  // [STATION-6] `no repetition` | images used in the stated run | new images, or void that run if
+  //   its serial was wrong
   record.invalidate_verdict(fmt::format(
       "all images are those of run {}, which is no repetition: take new ones, or '{}' if that run "
       "should not count",
