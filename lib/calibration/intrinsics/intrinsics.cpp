@@ -206,7 +206,7 @@ class IntrinsicsSolver {
   /// Mean shift by which the corners of each view of the input were corrected, px.
   std::vector<double> edge_displacements_px_;
   /// Parameters to estimate; the warp only after solve_board_warp().
-  SolveOptions solved_parameters_{true, true, false, false};
+  SolveOptions solved_parameters_{.core = true, .distortions = true};
   InitialPoses initial_poses_;
   std::vector<std::size_t> used_;
   std::vector<IntrinsicsSolution::DroppedView> dropped_;
@@ -233,7 +233,7 @@ bool IntrinsicsSolver::solve_intrinsics_from_focal_length(double focal_px) {
     initialize_board_poses(lens);
     if (used_.size() < kMinViews) return false;
     assemble_board_problem(lens);
-    if (!solve_intermediate_board_problem(problem_, {true, false, false, false})) return false;
+    if (!solve_intermediate_board_problem(problem_, {.core = true})) return false;
     lens = this->current_lens();
     if (std::abs(lens.focal_px().x() / before_px - 1) < convergence) break;
   }
@@ -283,7 +283,9 @@ bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
         fit_rotation_between_lenses(current_lens(), Lens(LensModel::fisheye, symmetric_), pixels);
     if (!start) return true;
     rotate_all_board_poses(symmetric.poses, *start);
-    if (!solve_board_problem(symmetric, {true, true, solved_parameters_.warp, false})) return true;
+    if (!solve_board_problem(symmetric,
+                             {.core = true, .distortions = true, .warp = solved_parameters_.warp}))
+      return true;
     const Lens fisheye(LensModel::fisheye, symmetric.intrinsics);
     symmetric_ = symmetric.intrinsics;
     const auto new_from_old = fit_rotation_between_lenses(current_lens(), fisheye, pixels);

@@ -68,7 +68,7 @@ struct IntrinsicsSolution {
   Lens fitted_lens() const { return Lens(problem.lens_model, problem.intrinsics); }
   /// Estimated parameters: the intrinsics (splined lenses: without the core), and the warp if
   /// selected.
-  SolveOptions solved_parameters{true, true, true, false};
+  SolveOptions solved_parameters{.core = true, .distortions = true, .warp = true};
 };
 
 /// Estimates lens, poses and warp of the board. Needs no initial focal length. Stages:

@@ -16,7 +16,7 @@
 namespace vlp {
 namespace {
 
-constexpr SolveOptions kLens{true, true, false, false};
+constexpr SolveOptions kLens{.core = true, .distortions = true};
 
 /// Returns a problem with corner errors of 0.05 px beside its minimum.
 BoardProblem make_problem_beside_minimum(LensModel lens_model, int num_views) {
@@ -154,24 +154,24 @@ void expect_same_parameters(const BoardProblem& found, const BoardProblem& truth
 TEST(SolveBoardProblem, ReturnsTrueParametersOfFisheyeWithWarp) {
   const BoardProblem truth = make_exact_problem();
   BoardProblem problem = perturb(truth, true, true);
-  ASSERT_TRUE(solve_board_problem(problem, {true, true, true, false}));
+  ASSERT_TRUE(solve_board_problem(problem, {.core = true, .distortions = true, .warp = true}));
   expect_same_parameters(problem, truth, 1e-7);
 }
 
 TEST(SolveBoardProblem, KeepsParametersThatAreNotSolved) {
   const BoardProblem truth = make_exact_problem();
   BoardProblem core = perturb(truth, false, false);
-  ASSERT_TRUE(solve_board_problem(core, {true, false, false, false}));
+  ASSERT_TRUE(solve_board_problem(core, {.core = true}));
   expect_same_parameters(core, truth, 1e-7);
   for (std::size_t i = 4; i < 8; ++i) EXPECT_EQ(core.intrinsics[i], truth.intrinsics[i]);
   EXPECT_EQ(core.warp_m, truth.warp_m);
   BoardProblem poses = perturb(truth, false, false);
   poses.intrinsics = truth.intrinsics;
-  ASSERT_TRUE(solve_board_problem(poses, {false, false, false, false}));
+  ASSERT_TRUE(solve_board_problem(poses, {}));
   expect_same_parameters(poses, truth, 1e-7);
   EXPECT_EQ(poses.intrinsics, truth.intrinsics);
   BoardProblem flat = perturb(truth, true, true);
-  ASSERT_TRUE(solve_board_problem(flat, {true, true, false, false}));
+  ASSERT_TRUE(solve_board_problem(flat, {.core = true, .distortions = true}));
   EXPECT_EQ(flat.warp_m, Eigen::Vector2d(0, 0));
   EXPECT_GT(compute_max_residual_difference_px(flat, truth), 0.01);
 }
@@ -217,8 +217,8 @@ Eigen::VectorXd compute_weighted_residuals(const BoardProblem& problem) {
 TEST(LinearizeBoardProblemAnalytically, MatchesDifferenceQuotients) {
   const BoardProblem problem = make_problem_to_linearize(LensModel::fisheye);
   for (const bool warp : {false, true}) {
-    const Linearization at =
-        linearize_board_problem_analytically(problem, {true, true, warp, false});
+    const Linearization at = linearize_board_problem_analytically(
+        problem, {.core = true, .distortions = true, .warp = warp});
     const std::size_t states = 8 + 6 * 4 + (warp ? 2 : 0);
     ASSERT_EQ(at.jacobian_transposed.rows(), static_cast<Eigen::Index>(states));
     ASSERT_EQ(at.jacobian_transposed.cols(), 640);
@@ -245,7 +245,7 @@ TEST(LinearizeBoardProblemAnalytically, MatchesDifferenceQuotients) {
 
 TEST(LinearizeBoardProblem, MatchesMrcalForOpencv8) {
   const BoardProblem problem = make_problem_to_linearize(LensModel::opencv8);
-  const SolveOptions options{true, true, true, false};
+  const SolveOptions options{.core = true, .distortions = true, .warp = true};
   const Linearization by_mrcal = linearize_board_problem(problem, options),
                       analytic = linearize_board_problem_analytically(problem, options);
   EXPECT_GT(by_mrcal.regularization.size(), 0);

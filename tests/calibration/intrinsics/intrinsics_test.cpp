@@ -330,7 +330,7 @@ TEST(SolveIntrinsics, SplinedLensKeepsAxisAndSidewaysRaysOfFisheye) {
   BoardProblem symmetric = solution.problem;
   symmetric.lens_model = LensModel::fisheye;
   symmetric.intrinsics = {420, 422, 402, 297, 0.03, -0.012, 0.004, -0.0006};
-  ASSERT_TRUE(solve_board_problem(symmetric, {true, true, false, false}));
+  ASSERT_TRUE(solve_board_problem(symmetric, {.core = true, .distortions = true}));
   const auto rotation =
       fit_rotation_between_lenses(lens, Lens(symmetric.lens_model, symmetric.intrinsics),
                                   collect_inlier_corner_pixels(solution.problem));

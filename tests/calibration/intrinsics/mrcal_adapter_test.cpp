@@ -83,7 +83,7 @@ BoardProblem make_exact_mrcal_problem(LensModel model, int boards = 4, int cols 
   return problem;
 }
 
-constexpr SolveOptions kAllParameters{true, true, true, false};
+constexpr SolveOptions kAllParameters{.core = true, .distortions = true, .warp = true};
 
 TEST(SolveBoardProblemByMrcal, ErrorByRegularizationDecreasesWithSquareOfNoise) {
   std::vector<double> errors;
