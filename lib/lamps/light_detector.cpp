@@ -327,8 +327,9 @@ std::optional<MeasuredLight> LightDetector::fit_outline(
   if (blob.runs.empty()) return std::nullopt;
   const Lamp* lamp = find_lamp_of_period(found);
   if (!rectangle_sizes_m_.empty() && (!lamp || lamp->shape.kind == ShapeKind::rectangle)) {
-    auto light = fit_rectangular_light(lines, blob, find_blob_outline(lines, blob, background),
-                                       background, shape_, rectangle_sizes_m_);
+    auto light =
+        fit_rectangular_light(lines, blob, find_blob_outline(lines, blob, background),
+                              found.fit.period_lines, background, shape_, rectangle_sizes_m_);
     if (light) return light;
   }
   return fit_rim_of_light(lines, blob, found.fit.period_lines, background, shape_,

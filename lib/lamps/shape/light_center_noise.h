@@ -15,7 +15,7 @@ namespace vlp {
 //     sigma^2 = trace(C) / 2 + sum of b^2
 //
 //   C  covariance of the center from the fit of its outline: fit_disc_outline(),
-//      fit_straight_edge(), or OutlineEquations for a camera that moves
+//      fit_rectangle_outline(), or OutlineEquations for a camera that moves
 //   b  systematic errors per axis: another possible center, a hidden end, an unknown lens
 //
 // A center without an outline has ModulatedLight::center_sd_px.

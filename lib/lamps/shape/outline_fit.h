@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <span>
 
 #include "lamps/image/background.h"
 #include "lamps/image/image_view.h"
@@ -90,6 +91,76 @@ std::optional<OutlineFit> fit_disc_outline(const ImageView& lines, const PlaneEl
                                            double start_blur_px, double period_lines,
                                            const Background& background, const LightShape& shape,
                                            const std::optional<KnownRadius>& known_radius = {});
+
+/// Rectangle in the plane of LightShape. The normalized position of a point p on the light is
+/// between -1 and 1 in both components. With P = off_axis, q = p - start:
+///
+///     u = unit_from_plane (p + distortion (P |q|^2 + 2 q (P . q) + q |q|^2) - center),
+///     normalized position = u / (1 + keystone . u).
+///
+/// A tilt error causes the keystone, an unknown lens the distortion: the part of second and third
+/// order in q of (P + q) |P + q|^2.
+struct PlaneRectangle : PlaneEllipse {
+  Eigen::Vector2d keystone = Eigen::Vector2d::Zero();
+  double distortion = 0;
+  Eigen::Vector2d start = Eigen::Vector2d::Zero(), off_axis = Eigen::Vector2d::Zero();
+
+  /// Returns the ratio of the sides along the first and the second normalized axis.
+  double aspect() const;
+  /// Returns the deviation from right angles, in rad.
+  double shear() const;
+  Eigen::Vector2d compute_bend(const Eigen::Vector2d& point) const;
+  /// Returns a bound of the effect of keystone and distortion on normalized positions.
+  double compute_nonlinearity() const;
+  Eigen::Vector2d unit_from_plane_point(const Eigen::Vector2d& point) const;
+  Eigen::Vector2d plane_point_from_unit(const Eigen::Vector2d& unit) const;
+};
+
+/// Result of fit_rectangle_outline().
+struct RectangleFit {
+  PlaneRectangle outline;
+  /// As in OutlineFit; radius of the disc of equal area.
+  double center_sd_px, radius_px, blur_px, inlier_fraction;
+  /// Covariance of center, size, elongation, rotations of both pairs of sides, keystone and
+  /// distortion, in pixels.
+  Eigen::Matrix<double, 9, 9> covariance_px;
+
+  void add_error_to_center(double sd_px) { center_sd_px = std::hypot(center_sd_px, sd_px); }
+};
+
+/// Change of the log aspect ratio of a rectangle that an unknown tilt of 5 degrees causes, 35
+/// degrees off axis. Its angles change by about as much, in rad.
+inline constexpr double kUnknownTiltSd = 0.06;
+
+/// Returns the standard deviation of the angles and of the log aspect ratio in the plane: a
+/// calibrated tilt is accurate to some tenths of a degree. Every given tilt counts as calibrated,
+/// and an identity rotation as an unknown tilt.
+double get_tilt_sd(const LightShape& shape);
+
+/// Fits the outline of a rectangle as fit_disc_outline() fits that of a disc. Pixels within 4 px or
+/// a quarter of a side of a corner are not used. The level inside also changes along a scanline: by
+/// the slope common to the cells, which their levels on both sides of the center determine, and in
+/// each cell by 0 +- 0.1 % of the level per pixel. The tone curve is not estimated.
+///
+/// Priors: right angles up to get_tilt_sd(), a keystone of 1.5 times this error times half of a
+/// side; without a lens 0.2 rad, and the distortion 0 +- 1 / (3 f^2), with f half of the diagonal
+/// of the image, as for an equidistant lens of 115 degrees from corner to corner.
+///
+/// Sides in dark stripes: a cell of low contrast does not constrain the outline. The position of
+/// each side is estimated by the likelihood of the pixels near its middle as well. It assumes that
+/// the level inside is that of the scanlines whole periods away, with its standard deviation, and
+/// limits the contribution of a scanline. A side that is more than 1.5 px from its mean position is
+/// moved there, and the fit repeated. If the standard deviation of the position exceeds 0.25 px,
+/// the side is hidden: mean and standard deviation replace the result of the fit, and the outline
+/// is corrected by the aspect ratio of the only one of `sizes_m` that agrees with it.
+///
+/// @return std::nullopt as fit_disc_outline(), if a side cannot be placed, and without a lens if a
+///     side is hidden
+std::optional<RectangleFit> fit_rectangle_outline(const ImageView& lines, const PlaneEllipse& start,
+                                                  double start_blur_px, double period_lines,
+                                                  const Background& background,
+                                                  const LightShape& shape,
+                                                  std::span<const Eigen::Vector2d> sizes_m);
 
 /// Sets the outline of a light: its kind (edge or rim), center, sigma, box, radius, points, width
 /// of the edge, inlier fraction, and with a lens outline_equations. Adds 0.05 % of the radius to

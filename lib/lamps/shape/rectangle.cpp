@@ -18,12 +18,24 @@
 #include "geometry/symmetric.h"
 #include "lamps/shape/light_center_noise.h"
 #include "lamps/shape/outline_fit.h"
-#include "lamps/shape/straight_edge.h"
+#include "lamps/signal/stripes.h"
 
 namespace vlp {
 namespace {
 
 using Corners = std::array<Eigen::Vector2d, 4>;
+
+/// Side of a rectangle in the plane of LightShape, from one corner to the next; the light is on its
+/// left.
+struct Side {
+  Eigen::Vector2d from, to;
+
+  Eigen::Vector2d edge_direction() const { return (to - from).normalized(); }
+  Eigen::Vector2d inward_normal() const {
+    const Eigen::Vector2d along = edge_direction();
+    return {-along.y(), along.x()};
+  }
+};
 using Sides = std::array<Side, 4>;
 
 double cross_product(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
@@ -57,12 +69,6 @@ std::optional<Corners> find_corners(const Sides& sides) {
   return corners;
 }
 
-std::optional<Eigen::Vector2d> find_center(const Sides& sides) {
-  const auto corners = find_corners(sides);
-  if (!corners) return std::nullopt;
-  return find_intersection({(*corners)[0], (*corners)[2]}, {(*corners)[1], (*corners)[3]});
-}
-
 /// Returns true if all angles are right angles within 20 degrees.
 bool is_rectangular(const Sides& sides) {
   const double max_off = std::sin(rad_from_deg(20));
@@ -80,36 +86,6 @@ double compute_aspect(const Sides& sides) {
   const auto length = [&](std::size_t i) { return (sides[i].to - sides[i].from).norm(); };
   const double ratio = (length(0) + length(2)) / (length(1) + length(3));
   return std::max(ratio, 1 / ratio);
-}
-
-double square(double value) { return value * value; }
-
-/// Returns the standard deviation of the angles and of the log aspect ratio in the plane: a
-/// calibrated tilt is accurate to some tenths of a degree. Every given tilt counts as calibrated,
-/// and an identity rotation as an unknown tilt.
-double get_tilt_sd(const LightShape& shape) {
-  return shape.is_camera_tilted() ? kUnknownTiltSd / 30 : kUnknownTiltSd;
-}
-
-/// Returns the variance of the distance of an edge's middle, in square pixels.
-double compute_middle_variance(const StraightEdge& edge) { return edge.covariance_px.sum() / 4; }
-
-/// Returns the distance of the middle of side `to` from side `from`.
-double compute_distance_from_line(const Side& from, const Side& to) {
-  return std::abs(((to.from + to.to) / 2 - (from.from + from.to) / 2).dot(from.inward_normal()));
-}
-
-/// Returns the standard deviation of the logarithm of compute_aspect().
-double compute_aspect_sd(const std::array<StraightEdge, 4>& edges, double per_px) {
-  constexpr double blur_sd_fraction = 0.25;
-  double variance = 0;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const StraightEdge &edge = edges[i], &opposite = edges[(i + 2) % 4];
-    const double apart_px = compute_distance_from_line(edge.side, opposite.side) / per_px;
-    variance += (compute_middle_variance(edge) + square(blur_sd_fraction * edge.profile.blur_px)) /
-                square(apart_px);
-  }
-  return std::sqrt(variance);
 }
 
 /// Computes the minimum-area rectangle around the points, with the light on the left of its sides:
@@ -237,60 +213,38 @@ std::optional<FirstCorners> find_corners_of_curved_sides(
   return best;
 }
 
-/// Offset of the image of the center from the intersection of the diagonals under an unknown lens,
-/// and its standard deviation.
-///
-/// The lens model is p (1 + k |p|^2), p relative to the image center. To first order of k an edge
-/// of half-length h at the position p is curved by -k h^2 p . n across it. The diagonals intersect
-/// k (a^2 + b^2) p from the center, with a and b half of the sides. The prior of k has the standard
-/// deviation of an equidistant lens of 115 degrees from corner to corner.
-struct CenterOffset {
-  Eigen::Vector2d shift;
-  double sd_px;
-};
-
-CenterOffset estimate_center_offset(const std::array<StraightEdge, 4>& edges,
-                                    const Eigen::Vector2d& center, const Eigen::Vector2d& middle) {
-  constexpr double curvature_sd_ratio = 2,
-                   higher_order_ratio = 0.1;  // ratio to that of the ends; higher orders
-  const double focal_px = middle.norm(), known_sd = 1 / (3 * focal_px * focal_px);
-  double information = 1 / (known_sd * known_sd), moment = 0;
-  Eigen::Vector2d d_shift_d_k = Eigen::Vector2d::Zero();
-  for (const StraightEdge& edge : edges) {
-    const Eigen::Vector2d direction = edge.side.to - edge.side.from, in = edge.side.inward_normal();
-    const double half_square = direction.squaredNorm() / 4;
-    const Eigen::Vector2d at = (edge.side.from + edge.side.to) / 2 - middle;
-    const double slope = -half_square * at.dot(in);
-    const double variance =
-        curvature_sd_ratio * curvature_sd_ratio * edge.covariance_px.trace() / 2;
-    information += slope * slope / variance;
-    moment += slope * edge.sagitta_px / variance;
-    d_shift_d_k -= half_square / 2 * (center - middle);
-  }
-  const double k = moment / information;
-  const double sd_px =
-      std::hypot(1 / std::sqrt(information), higher_order_ratio * k) * d_shift_d_k.norm();
-  return {k * d_shift_d_k, sd_px / std::numbers::sqrt2};
+/// Returns true if the outline extends into the corners, unlike that of a disc: the squared
+/// distance from the center is 1 on an ellipse inside the sides, and up to 2 on the sides.
+bool does_outline_reach_corners(const std::vector<Eigen::Vector2d>& points,
+                                const PlaneRectangle& rectangle) {
+  constexpr double beyond = 1.35, min_fraction = 0.1;
+  const auto far = std::ranges::count_if(points, [&](const Eigen::Vector2d& at) {
+    return rectangle.unit_from_plane_point(at).squaredNorm() > beyond;
+  });
+  return double(far) >= min_fraction * double(points.size());
 }
 
-/// Returns the polygon at the depth `inset` inside the sides, (u, v); empty if the lens does not
+/// Returns half of the sides, in pixels.
+Eigen::Vector2d compute_half_sides_px(const PlaneRectangle& rectangle, double per_px) {
+  return (per_px * rectangle.unit_from_plane.rowwise().norm()).cwiseInverse();
+}
+
+/// Returns the polygon at the depth `inset_px` inside the sides, (u, v); empty if the lens does not
 /// cover it.
-std::vector<Eigen::Vector2d> make_polygon(const Sides& sides, double inset,
-                                          const LightShape& shape) {
+std::vector<Eigen::Vector2d> make_polygon(const PlaneRectangle& rectangle, double inset_px,
+                                          double per_px, const LightShape& shape) {
   constexpr int pieces = 8;
-  Sides inside = sides;
-  for (Side& side : inside) {
-    const Eigen::Vector2d in = inset * side.inward_normal();
-    side.from += in;
-    side.to += in;
-  }
-  const auto corners = find_corners(inside);
+  constexpr std::array<std::array<int, 2>, 5> corners = {
+      {{-1, -1}, {1, -1}, {1, 1}, {-1, 1}, {-1, -1}}};
+  const Eigen::Array2d half_px = compute_half_sides_px(rectangle, per_px);
+  if (!(half_px.minCoeff() > inset_px)) return {};
   std::vector<Eigen::Vector2d> face;
-  if (!corners) return face;
   for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d &from = (*corners)[i], &to = (*corners)[(i + 1) % 4];
+    const Eigen::Array2d from(corners[i][0], corners[i][1]),
+        to(corners[i + 1][0], corners[i + 1][1]);
     for (int piece = 0; piece < pieces; ++piece) {
-      const auto pixel = shape.pixel_from_level_plane_point(from + (to - from) * piece / pieces);
+      const Eigen::Vector2d at = (from + (to - from) * piece / pieces) * (1 - inset_px / half_px);
+      const auto pixel = shape.pixel_from_level_plane_point(rectangle.plane_point_from_unit(at));
       if (!pixel) return {};
       face.push_back(*pixel);
     }
@@ -298,255 +252,59 @@ std::vector<Eigen::Vector2d> make_polygon(const Sides& sides, double inset,
   return face;
 }
 
-/// Covariance of the distances of the ends from the edges: from and to of edge 0, from and to of
-/// edge 1, and so on.
-using EndsCovariance = Eigen::Matrix<double, 8, 8>;
-
-/// Returns the covariance of the two ends of an edge.
-auto get_block(EndsCovariance& ends, std::size_t edge) {
-  return ends.block<2, 2>(2 * Eigen::Index(edge), 2 * Eigen::Index(edge));
+/// Returns the largest standard deviation of the distance of a side, in pixels.
+double compute_side_sd_px(const RectangleFit& fit, const Eigen::Vector2d& half_px) {
+  double variance_px2 = 0;
+  for (const int side : {0, 1}) {
+    const Eigen::Vector2d normal = fit.outline.unit_from_plane.row(side).normalized();
+    const double growth = half_px[side] / fit.radius_px;
+    const Eigen::Vector4d slope(normal.x(), normal.y(), growth, side == 0 ? growth : -growth);
+    variance_px2 =
+        std::max(variance_px2, slope.dot(fit.covariance_px.topLeftCorner<4, 4>() * slope));
+  }
+  return std::sqrt(variance_px2);
 }
 
-/// Moves the sides to the most probable rectangle, and updates the covariance (Kalman's update). A
-/// tilt error makes opposite sides converge by its product with their distance, in the plane at
-/// height 1, and changes right angles by get_tilt_sd(). Makes no correction if the angles
-/// contradict, because an object may hide a part.
-void apply_right_angles(const LightShape& shape, double per_px, Sides& sides,
-                        EndsCovariance& covariance) {
-  constexpr double clear = 16;      // chi-square of three angles: one in a thousand
-  constexpr double per_lean = 1.5;  // tilt error in rad over get_tilt_sd()
-  constexpr std::array<std::array<std::size_t, 2>, 3> pairs = {{{0, 2}, {1, 3}, {0, 1}}};
-  Eigen::Matrix<double, 3, 8> slope = Eigen::Matrix<double, 3, 8>::Zero();
-  Eigen::Vector3d angles, sds;
-  for (int i = 0; i < 3; ++i) {
-    const auto [a, b] = pairs[std::size_t(i)];
-    const Side &side = sides[a], &other = sides[b];
-    const bool opposite = b - a == 2;
-    const Eigen::Vector2d expected = opposite ? -side.edge_direction() : side.inward_normal();
-    angles[i] = std::atan2(cross_product(expected, other.edge_direction()),
-                           expected.dot(other.edge_direction()));
-    sds[i] =
-        get_tilt_sd(shape) * (opposite ? per_lean * compute_distance_from_line(side, other) : 1);
-    const double length_px = (side.to - side.from).norm() / per_px;
-    const double other_px = (other.to - other.from).norm() / per_px;
-    slope.block<1, 2>(i, 2 * Eigen::Index(a)) << 1 / length_px, -1 / length_px;
-    slope.block<1, 2>(i, 2 * Eigen::Index(b)) << -1 / other_px, 1 / other_px;
-  }
-  Eigen::Matrix3d spread = slope * covariance * slope.transpose();
-  spread.diagonal() += sds.cwiseAbs2();
-  const Eigen::LDLT<Eigen::Matrix3d> factor(spread);
-  if (!(angles.dot(factor.solve(angles)) < clear)) return;
-  const Eigen::Matrix<double, 8, 3> gain = factor.solve(slope * covariance).transpose();
-  const Eigen::Matrix<double, 8, 1> moved_px = -gain * angles;
-  covariance -= gain * slope * covariance;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const Eigen::Vector2d inwards = sides[i].inward_normal() * per_px;
-    sides[i].from += moved_px[2 * Eigen::Index(i)] * inwards;
-    sides[i].to += moved_px[2 * Eigen::Index(i) + 1] * inwards;
-  }
-}
-
-/// Computes the covariance of the image of the center, in square pixels, from that of the ends.
-std::optional<Matrix2> center_covariance(const Sides& sides, const EndsCovariance& ends,
-                                         double per_px, const LightShape& shape) {
-  constexpr double moved_px = 0.05;
-  const auto pixel_with = [&](const Sides& moved) -> std::optional<Eigen::Vector2d> {
-    const auto center = find_center(moved);
-    return center ? shape.pixel_from_level_plane_point(*center) : std::nullopt;
-  };
-  const auto here = pixel_with(sides);
-  Eigen::Matrix<double, 2, 8> slope;
-  for (int end = 0; end < 8; ++end) {
-    Sides moved = sides;
-    Side& side = moved[std::size_t(end / 2)];
-    (end % 2 == 0 ? side.from : side.to) += moved_px * per_px * side.inward_normal();
-    const auto there = pixel_with(moved);
-    if (!here || !there) return std::nullopt;
-    slope.col(end) = (*there - *here) / moved_px;
-  }
-  return slope * ends * slope.transpose();
-}
-
-/// Returns true if the outline extends into the corners, unlike that of a disc: (2 u / length)^2 +
-/// (2 v / width)^2 is 1 on an ellipse inside the sides, and up to 2 on the sides.
-bool does_outline_reach_corners(const std::vector<Eigen::Vector2d>& points, const Sides& sides,
-                                const Eigen::Vector2d& center) {
-  constexpr double beyond = 1.35, min_fraction = 0.1;
-  const auto off_middle = [&](const Eigen::Vector2d& at, std::size_t i) {
-    const double length = (sides[i].to - sides[i].from).norm();
-    return std::pow(2 * (at - center).dot(sides[i].edge_direction()) / length, 2);
-  };
-  const auto far = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
-    return off_middle(at, 0) + off_middle(at, 1) > beyond;
-  });
-  return double(far) >= min_fraction * double(points.size());
-}
-
-/// Makes a light of four edges; `points` are the outline in the plane.
-std::optional<MeasuredLight> fit_light(std::array<StraightEdge, 4>& edges, double per_px,
-                                       const std::vector<Eigen::Vector2d>& points,
-                                       const Eigen::Vector2d& middle, const LightShape& shape) {
-  constexpr double outlier_px = 3, max_outside = 0.25;
-  Sides sides;
-  EndsCovariance ends = EndsCovariance::Zero();
-  for (std::size_t i = 0; i < 4; ++i) {
-    sides[i] = edges[i].side;
-    get_block(ends, i) = edges[i].covariance_px;
-  }
-  if (shape.has_known_lens()) apply_right_angles(shape, per_px, sides, ends);
-  const auto corners = find_corners(sides);
-  if (!corners || !is_rectangular(sides)) return std::nullopt;
-  const auto center = find_center(sides);
-  if (!center || !does_outline_reach_corners(points, sides, *center)) return std::nullopt;
-  const auto covariance = center_covariance(sides, ends, per_px, shape);
-  sides = make_sides(*corners);
-  auto pixel = shape.pixel_from_level_plane_point(*center);
-  const auto around = make_polygon(sides, 0, shape);
-  if (!pixel || !covariance || around.empty()) return std::nullopt;
-  MeasuredLight light{};
-  double lens_sd_px = 0;
-  if (!shape.has_known_lens()) {
-    const CenterOffset behind =
-        estimate_center_offset(edges, *center, shape.swap_image_and_scanline_axes(middle));
-    *pixel += behind.shift;
-    lens_sd_px = behind.sd_px;
-  }
-  light.outline_kind = LightOutline::rectangle;
-  light.pixel = *pixel;
-  light.box = Eigen::AlignedBox2d(*pixel);
-  for (const Eigen::Vector2d& at : around) light.box.extend(at);
-  light.radius_px = std::sqrt(compute_polygon_area(around) / std::numbers::pi);
-  double sagitta_px = 0, end_sd_px = 0;
-  light.inlier_fraction = 1;
-  for (StraightEdge& edge : edges) {
-    end_sd_px = std::max(end_sd_px, std::sqrt(edge.covariance_px.diagonal().maxCoeff()));
-    sagitta_px = std::max(sagitta_px, std::abs(edge.sagitta_px));
-    light.rise_px = std::max(light.rise_px, kRisePerBlur * edge.profile.blur_px);
-    light.inlier_fraction = std::min(light.inlier_fraction, edge.explained_fraction);
-    for (const Eigen::Vector2d& point : edge.points)
-      light.outline.push_back(shape.swap_image_and_scanline_axes(point));
-  }
-  light.box.min().array() -= 2 * end_sd_px;
-  light.box.max().array() += 2 * end_sd_px;
-  const auto sigma_px = limit_center_sd(std::hypot(compute_center_sd(*covariance), lens_sd_px));
-  if (!sigma_px) return std::nullopt;
-  light.sigma_px = *sigma_px;
-  const auto outliers = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& at) {
-    return std::any_of(sides.begin(), sides.end(), [&](const Side& side) {
-      return (at - side.from).dot(side.inward_normal()) < -(outlier_px + sagitta_px) * per_px;
-    });
+/// Makes a light of a fitted rectangle; `points` are the outline in the plane. Returns std::nullopt
+/// if the points contradict it.
+std::optional<MeasuredLight> make_light(const RectangleFit& fit, double per_px,
+                                        const std::vector<Eigen::Vector2d>& points,
+                                        const LightShape& shape) {
+  constexpr double outlier_px = 3, max_outside = 0.25, blur_sd_fraction = 0.25;
+  const PlaneRectangle& rectangle = fit.outline;
+  if (!does_outline_reach_corners(points, rectangle)) return std::nullopt;
+  const Eigen::Vector2d half_px = compute_half_sides_px(rectangle, per_px);
+  const auto outliers = std::ranges::count_if(points, [&](const Eigen::Vector2d& at) {
+    const Eigen::Vector2d u = rectangle.unit_from_plane_point(at);
+    return ((u.array().abs() - 1) * half_px.array()).maxCoeff() > outlier_px;
   });
   if (double(outliers) > max_outside * double(points.size())) return std::nullopt;
-  light.inner_polygon = make_polygon(sides, outlier_px * per_px, shape);
-  light.aspect = compute_aspect(sides);
-  light.aspect_sd = compute_aspect_sd(edges, per_px);
-  return light.inner_polygon.empty() ? std::nullopt : std::optional(std::move(light));
-}
-
-/// Edges of a rectangle in the order of its sides; std::nullopt for edges that are not found.
-using FoundEdges = std::array<std::optional<StraightEdge>, 4>;
-
-/// Returns the profile of the edge with the smallest variance. @pre At least one edge exists.
-EdgeProfile find_most_certain_profile(const FoundEdges& edges) {
-  const StraightEdge* surest = nullptr;
-  for (const auto& edge : edges) {
-    if (!edge) continue;
-    if (surest == nullptr || compute_middle_variance(*edge) < compute_middle_variance(*surest))
-      surest = &*edge;
-  }
-  return surest->profile;
-}
-
-/// Offset of an edge's middle from its fitted position, inside positive.
-struct Place {
-  double offset_px, sd_px;
-};
-
-/// Predicts the position of edge i from the other three by the aspect ratio of the only size that
-/// agrees with its fitted position. Returns std::nullopt if several sizes or none agree.
-std::optional<Place> predict_edge_position(const EdgeImage& image, const FoundEdges& edges,
-                                           std::size_t i,
-                                           const std::vector<Eigen::Vector2d>& sizes_m) {
-  constexpr double size_sd_m = 0.001;  // sizes are given to the millimeter
-  constexpr double bounds = 2,
-                   clear = 3;  // standard deviations: a uniform distribution ends at sqrt(3)
-  const StraightEdge &edge = *edges[i], &opposite = *edges[(i + 2) % 4];
-  const StraightEdge &left = *edges[(i + 1) % 4], &right = *edges[(i + 3) % 4];
-  const double length_px = compute_distance_from_line(left.side, right.side) / image.per_px;
-  const double depth_px = compute_distance_from_line(opposite.side, edge.side) / image.per_px;
-  std::optional<Place> place;
-  // The variance of the opposite edge counts three times. Edges are assumed to be independent,
-  // but its error moves both edges.
-  for (const Eigen::Vector2d& size_m : sizes_m) {
-    for (const double ratio : {size_m[0] / size_m[1], size_m[1] / size_m[0]}) {
-      const double relative_variance = square(get_tilt_sd(image.shape)) +
-                                       square(size_sd_m) * size_m.cwiseAbs2().cwiseInverse().sum();
-      const double variance =
-          relative_variance * square(ratio * length_px) + 3 * compute_middle_variance(opposite) +
-          square(ratio) * (compute_middle_variance(left) + compute_middle_variance(right));
-      const Place here{depth_px - ratio * length_px, std::sqrt(variance)};
-      const double reach_px =
-          bounds * std::sqrt(compute_middle_variance(edge)) + clear * here.sd_px;
-      if (std::abs(here.offset_px) > reach_px) continue;
-      if (place && std::abs(place->offset_px - here.offset_px) > 0.1 * here.sd_px) return {};
-      place = here;
-    }
-  }
-  return place;
-}
-
-/// Returns half the distance between a side and the opposite one, in pixels.
-double compute_reach_px(const Sides& sides, std::size_t i, double per_px) {
-  return compute_distance_from_line(sides[i], sides[(i + 2) % 4]) / per_px / 2;
-}
-
-/// Adds hidden edges from the visible ones, see fit_rectangular_light(). Returns false if two
-/// neighboring edges are missing or a missing edge is not found.
-bool add_hidden_edges(const EdgeImage& image, const Sides& sides, EdgeSearch search,
-                      const std::vector<Eigen::Vector2d>& sizes_m, FoundEdges& edges) {
-  constexpr double ramp_lines = 3, unknown_sd_px = 100;
-  const FoundEdges visible = edges;
-  search.positions = 24;
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (!visible[i] && !visible[(i + 1) % 4]) return false;
-  }
-  search.profile = find_most_certain_profile(visible);
-  Sides expected = sides;
-  EndsCovariance ends = square(unknown_sd_px) * EndsCovariance::Identity();
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (!visible[i]) continue;
-    expected[i] = visible[i]->side;
-    get_block(ends, i) = visible[i]->covariance_px;
-  }
-  apply_right_angles(image.shape, image.per_px, expected, ends);
-  const auto corners = find_corners(expected);
-  if (!corners) return false;
-  expected = make_sides(*corners);
-  for (std::size_t i = 0; i < 4; ++i) {
-    if (visible[i]) continue;
-    const Side& side = expected[i];
-    // The window extends to the next stripe, but not to the opposite edge.
-    search.reach_px = std::min(image.levels.stripe_period_lines() + ramp_lines,
-                               compute_reach_px(expected, i, image.per_px));
-    const Eigen::Vector2d difference(-1, 1);
-    // Twice the sd, because apply_right_angles() uses the angles again.
-    const double slant_sd_px = std::sqrt(difference.dot(get_block(ends, i) * difference));
-    const auto find = [&](double offset_px, double offset_sd_px) {
-      return estimate_position_of_edge_in_dark_stripe(image, side, search,
-                                                      {offset_px, offset_sd_px, slant_sd_px});
-    };
-    edges[i] = find(0, std::numeric_limits<double>::infinity());
-    if (!edges[i]) return false;
-    if (!visible[(i + 2) % 4]) continue;
-    const auto place = predict_edge_position(image, edges, i, sizes_m);
-    if (!place) continue;
-    const Eigen::Vector2d moved =
-        (edges[i]->side.from + edges[i]->side.to) / 2 - (side.from + side.to) / 2;
-    edges[i] =
-        find(place->offset_px + moved.dot(side.inward_normal()) / image.per_px, place->sd_px);
-    if (!edges[i]) return false;
-  }
-  return true;
+  const auto pixel =
+      shape.pixel_from_level_plane_point(rectangle.plane_point_from_unit(Eigen::Vector2d::Zero()));
+  const auto sigma_px = limit_center_sd(fit.center_sd_px);
+  MeasuredLight light{};
+  light.outline = make_polygon(rectangle, 0, per_px, shape);
+  light.inner_polygon = make_polygon(rectangle, outlier_px, per_px, shape);
+  if (!pixel || !sigma_px || light.outline.empty() || light.inner_polygon.empty())
+    return std::nullopt;
+  light.outline_kind = LightOutline::rectangle;
+  light.pixel = *pixel;
+  light.sigma_px = *sigma_px;
+  light.box = Eigen::AlignedBox2d(*pixel);
+  for (const Eigen::Vector2d& at : light.outline) light.box.extend(at);
+  const double side_sd_px = compute_side_sd_px(fit, half_px);
+  light.box.min().array() -= 2 * side_sd_px;
+  light.box.max().array() += 2 * side_sd_px;
+  light.radius_px = std::sqrt(compute_polygon_area(light.outline) / std::numbers::pi);
+  light.rise_px = kRisePerBlur * fit.blur_px;
+  light.inlier_fraction = fit.inlier_fraction;
+  const double aspect = rectangle.aspect();
+  light.aspect = std::max(aspect, 1 / aspect);
+  // Elongation is half of the log aspect ratio.
+  light.aspect_sd = std::hypot(
+      2 * std::sqrt(fit.covariance_px(3, 3)) / fit.radius_px,
+      blur_sd_fraction * fit.blur_px / std::numbers::sqrt2 * half_px.cwiseInverse().norm());
+  return light;
 }
 
 /// Outline of a light in the plane of LightShape, and the size of a pixel there.
@@ -582,46 +340,6 @@ std::optional<FirstCorners> find_initial_corners(const PlaneOutline& outline, bo
   return first;
 }
 
-/// Returns the chords of the face at the depth `inset` inside the sides. Returns an empty vector if
-/// there are too few, or if they are not on consecutive scanlines, because LineLevels assigns
-/// levels by index.
-std::vector<PixelRun> find_chords_inside_sides(const Sides& sides, double inset,
-                                               const ImageSize& size, const LightShape& shape) {
-  constexpr std::size_t min_lines = 8;
-  auto chords = find_chords_in_polygon(
-      shape.swap_image_and_scanline_axes(make_polygon(sides, inset, shape)), size);
-  if (chords.size() < min_lines) return {};
-  const int rows = chords.back().row - chords.front().row + 1;
-  if (rows != static_cast<int>(chords.size())) return {};
-  return chords;
-}
-
-/// Rectangle with the edges of a pass, from which the next pass starts.
-struct FittedRectangle {
-  std::array<StraightEdge, 4> edges;
-  Corners corners;
-  /// Largest curvature of an edge.
-  double sagitta_px;
-  /// Levels across the most certain edge.
-  std::optional<EdgeProfile> profile;
-};
-
-/// Returns std::nullopt if the edges do not form a rectangle.
-/// @pre all edges were found
-std::optional<FittedRectangle> assemble_rectangle(FoundEdges found) {
-  FittedRectangle result{{}, {}, 0, find_most_certain_profile(found)};
-  Sides sides;
-  for (std::size_t i = 0; i < 4; ++i) {
-    result.edges[i] = std::move(*found[i]);
-    sides[i] = result.edges[i].side;
-    result.sagitta_px = std::max(result.sagitta_px, std::abs(result.edges[i].sagitta_px));
-  }
-  const auto corners = is_rectangular(sides) ? find_corners(sides) : std::nullopt;
-  if (!corners) return std::nullopt;
-  result.corners = *corners;
-  return result;
-}
-
 }  // namespace
 
 std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
@@ -653,10 +371,11 @@ std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>&
 
 std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const Blob& blob,
                                                    const std::vector<Eigen::Vector2d>& outline,
+                                                   double period_lines,
                                                    const Background& background,
                                                    const LightShape& shape,
                                                    const std::vector<Eigen::Vector2d>& sizes_m) {
-  constexpr double min_px = 6, max_aspect = 40;
+  constexpr double min_px = 6, max_aspect = 40, start_blur_px = 1.5, inset_px = 2;
   constexpr std::size_t min_points = 10;
   const PixelBox box = blob.blob_bounding_box();
   if (outline.size() < min_points || std::min(box.width, box.height) < min_px) return {};
@@ -665,53 +384,24 @@ std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const
   const double per_px = in_plane->per_px;
   const auto first = find_initial_corners(*in_plane, shape.has_known_lens());
   if (!first) return std::nullopt;
-
-  // A disc that stripes partly hide is less slender than this.
-  constexpr double min_aspect = 3, max_round_off_px = 1;
-  const auto is_rather_round = [&](const Sides& sides) {
-    if (compute_aspect(sides) > min_aspect) return false;
-    const auto disc = fit_circle(in_plane->points);
-    if (!disc) return false;
-    const auto near = std::ranges::count_if(in_plane->points, [&](const Eigen::Vector2d& at) {
-      const double off = (at - disc->circle.center).norm() - disc->circle.radius;
-      return std::abs(off) < max_round_off_px * per_px;
-    });
-    return double(near) >= first->near * double(in_plane->points.size());
-  };
-  FittedRectangle rectangle{{}, first->corners, 0, {}};
-  struct Pass {
-    double inset_px;
-    EdgeSearch search;
-  };
-  for (auto [inset_px, search] : {Pass{5, {7, 48}}, Pass{3.5, {5, 48}}, Pass{3.5, {4, 96}}}) {
-    const Sides sides = make_sides(rectangle.corners);
-    const double min_side =
-        std::min((sides[0].to - sides[0].from).norm(), (sides[1].to - sides[1].from).norm());
-    if (!(min_side > min_px * per_px) || compute_aspect(sides) > max_aspect) return std::nullopt;
-    const double inset = std::min((inset_px + rectangle.sagitta_px) * per_px, min_side / 3);
-    const auto chords = find_chords_inside_sides(sides, inset, lines.size(), shape);
-    if (chords.empty()) return std::nullopt;
-    const LineLevels levels(lines, chords, background);
-    const double max_reach_px = search.reach_px + rectangle.sagitta_px;
-    search.profile = rectangle.profile;
-    const EdgeImage image{lines, levels, background.level, per_px, shape};
-    FoundEdges found_edges;
-    for (std::size_t i = 0; i < 4; ++i) {
-      search.reach_px = std::min(max_reach_px, compute_reach_px(sides, i, per_px));
-      found_edges[i] = fit_straight_edge(image, sides[i], search);
-    }
-    if (!std::ranges::all_of(found_edges, [](const auto& edge) { return edge.has_value(); })) {
-      if (!shape.has_known_lens() ||
-          !add_hidden_edges(image, sides, search, sizes_m, found_edges) || is_rather_round(sides)) {
-        return std::nullopt;
-      }
-    }
-    auto fitted = assemble_rectangle(std::move(found_edges));
-    if (!fitted) return std::nullopt;
-    rectangle = std::move(*fitted);
+  const Corners& corners = first->corners;
+  Matrix2 half_sides;
+  half_sides << (corners[1] - corners[0]) / 2, (corners[3] - corners[0]) / 2;
+  const PlaneEllipse start{(corners[0] + corners[1] + corners[2] + corners[3]) / 4,
+                           half_sides.inverse()};
+  const auto chords = find_chords_in_polygon(shape.swap_image_and_scanline_axes(make_polygon(
+                                                 PlaneRectangle{start}, inset_px, per_px, shape)),
+                                             lines.size());
+  const Stripes stripes =
+      measure_stripes(compute_scanline_signal(lines, chords, background.level, false));
+  if (stripes.contrast >= kMinContrast) period_lines = stripes.period_lines;
+  const auto fit =
+      fit_rectangle_outline(lines, start, start_blur_px, period_lines, background, shape, sizes_m);
+  if (!fit || 2 * compute_half_sides_px(fit->outline, per_px).minCoeff() < min_px ||
+      std::max(fit->outline.aspect(), 1 / fit->outline.aspect()) > max_aspect) {
+    return std::nullopt;
   }
-  const Eigen::Vector2d middle((lines.width - 1) / 2.0, (lines.height - 1) / 2.0);
-  return fit_light(rectangle.edges, per_px, in_plane->points, middle, shape);
+  return make_light(*fit, per_px, in_plane->points, shape);
 }
 
 }  // namespace vlp
