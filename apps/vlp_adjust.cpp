@@ -40,20 +40,18 @@ AdjustSet read_set(const Options& options, const std::string& set, bool is_in_pl
                    const LampMap& lamps, const Calibration& calibration) {
   const fs::path path(set);
   const bool folder = fs::is_directory(path);
-  AdjustSet read{last_path_component(path),
-                 {},
-                 {},
-                 is_in_place_rotation || last_path_component(path) == "rotation"};
+  AdjustSet read{
+      last_component(path), {}, {}, is_in_place_rotation || last_component(path) == "rotation"};
   if (folder) {
     CaptureOptions images = options.images;
     images.images = set;
-    read.frames = collect_lamp_frames_of_kept_images(
-        detect_lamps_in_captures(images, ImageUse::fixes, lamps, calibration).images);
+    read.frames = collect_lamp_frames(
+        detect_captured_lamps(images, ImageUse::fixes, lamps, calibration).images);
     read.captures =
-        options.position_sd_m ? read_captures_with_truth(path) : read_captures_csv_of_folder(path);
+        options.position_sd_m ? read_captures_with_truth(path) : read_folder_captures(path);
   } else {
     read.frames = read_detections(path);
-    read.captures = read_captures_csv_of_folder(path.parent_path());
+    read.captures = read_folder_captures(path.parent_path());
   }
   return read;
 }
@@ -73,10 +71,10 @@ void run(const CLI::App& app, const Options& options) {
       }
     }
   }
-  check_output_files_are_distinct(
-      {{"--output", images.output}, {"--refine-map", options.refined_map}}, inputs);
+  check_outputs_distinct({{"--output", images.output}, {"--refine-map", options.refined_map}},
+                         inputs);
   AdjustStepInput input;
-  input.lamps = read_overhead_lamps_of_room(images.lamps, images.frontend.room);
+  input.lamps = read_overhead_lamps(images.lamps, images.frontend.room);
   input.lamps_file = images.lamps;
   input.calibration = read_calibration(images.calibration);
   input.calibration_file = images.calibration;
@@ -95,21 +93,19 @@ void run(const CLI::App& app, const Options& options) {
   }
   std::vector<std::string> paths = options.sets;
   paths.insert(paths.end(), options.turns.begin(), options.turns.end());
-  replace_duplicate_set_names_by_paths(input.sets, paths);
+  make_set_names_unique(input.sets, paths);
   for (const AdjustSet& set : input.sets)
-    check_map_contains_captured_lamps(set.frames, input.lamps, input.lamps_file);
-  const AdjustStepResult result =
-      run_joint_adjustment_step(input, make_history_entry_from_command_line(app, inputs));
+    check_map_has_lamps(set.frames, input.lamps, input.lamps_file);
+  const AdjustStepResult result = run_adjust_step(input, make_command_entry(app, inputs));
   print_step_remarks(result);
-  throw_if_step_failed(result);
+  require_success(result);
   if (input.refine_map) {
-    write_refined_lamp_map(options.refined_map, result.adjustment.refined_map,
-                           images.frontend.room);
+    write_refined_map(options.refined_map, result.adjustment.refined_map, images.frontend.room);
   }
   write_calibration(images.output, result.calibration);
   const auto& report = input.calibration.intrinsics_report;
   const bool lens_stated = input.lens_sd_px || (report && report->covariance);
-  print_joint_adjustment(result.adjustment, input.calibration, lens_stated);
+  print_adjustment(result.adjustment, input.calibration, lens_stated);
 }
 
 void add_options(CLI::App& app, Options& options) {
@@ -133,23 +129,23 @@ void add_options(CLI::App& app, Options& options) {
       ->option_text("FILE");
   app.add_option("--map-sd-m", options.map_sd_m,
                  "Standard deviation per axis of lamp positions without sd_m, in m")
-      ->check(make_finite_non_negative_validator());
+      ->check(make_non_negative_validator());
   app.add_option("--position-sd-m", options.position_sd_m,
                  "Standard deviation per axis of known positions without position_sd_m, in m. Also "
                  "uses truth.csv in folders of images (default: such positions are ignored)")
-      ->check(make_finite_positive_validator());
+      ->check(make_positive_validator());
   app.add_option(
          "--lens-sd-px", options.lens_sd_px,
          "Standard deviation of each lens parameter, as RMS displacement of the image, in px. For "
          "calibrations without lens covariance; the lens is then estimated (default: exact lens)")
-      ->check(make_finite_positive_validator())
+      ->check(make_positive_validator())
       ->check(CLI::Range(1e-3, 1e3));  // px; smaller: exact lens, larger: unusable lens
-  add_motion_limit_options(
+  add_motion_options(
       app, options.motion,
       "Maximum speed of the camera, in m/s. Estimates the motion of each capture unless "
       "captures.csv has it (default: motion of captures.csv, or 0)");
-  add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
-  add_lamp_detection_options(app, options.images);
+  add_yaw_rate_sd(app, options.yaw_rate_sd_deg_per_s);
+  add_lamp_options(app, options.images);
 }
 
 }  // namespace
@@ -179,7 +175,7 @@ int main(int argc, char** argv) {
       "vlp-adjust");
   vlp::Options options;
   vlp::add_options(app, options);
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] {
+  return vlp::parse_and_run(app, argc, argv, [&] {
     if (options.sets.empty() && options.turns.empty()) {
       throw std::invalid_argument("SET: missing; give a folder of images or a table of detections");
     }

@@ -67,16 +67,16 @@ void run(const Options& options) {
   if (!squares && options.square_mm) {
     throw std::invalid_argument("--square-mm: only for --chessboard and --charuco; use --tag-mm");
   }
-  const PageSize& paper = find_page_size_by_name(options.paper);
+  const PageSize& paper = require_page_size(options.paper);
   Board board = make_board(options);
-  if (board.has_chessboard_squares() ? !options.square_mm : !options.tag_mm) {
-    const auto largest_m = find_largest_tag_size_for_page_m(board, paper);
+  if (board.has_squares() ? !options.square_mm : !options.tag_mm) {
+    const auto largest_m = find_tag_size_m(board, paper);
     if (!largest_m) {
       throw std::invalid_argument(fmt::format(
           "--cols, --rows: {} x {} {} do not fit on {}; use fewer or a larger --paper", board.cols,
-          board.rows, board.has_chessboard_squares() ? "squares" : "tags", paper.name));
+          board.rows, board.has_squares() ? "squares" : "tags", paper.name));
     }
-    (board.has_chessboard_squares() ? board.square_size_m : board.tag_size_m) = *largest_m;
+    (board.has_squares() ? board.square_size_m : board.tag_size_m) = *largest_m;
   }
   if (options.charuco) {
     constexpr double um_per_m = 1e6;
@@ -88,7 +88,7 @@ void run(const Options& options) {
       std::filesystem::path(options.output).replace_extension(".yaml").string();
   write_file(options.output, pdf);
   write_board(yaml, board);
-  if (board.has_chessboard_squares()) {
+  if (board.has_squares()) {
     fmt::print("{}: {} x {} squares of {:g} mm, on {}\n", options.output, board.cols, board.rows,
                board.square_size_m * kMillimetersPerMeter, paper.name);
   } else {
@@ -104,7 +104,7 @@ void add_options(CLI::App& app, Options& options) {
                  "Output file of the board, PDF. The board description has the same name with "
                  "extension .yaml")
       ->required()
-      ->check(make_file_extension_validator(".pdf"));
+      ->check(make_extension_validator(".pdf"));
   app.add_option("--paper", options.paper, "Paper size, A0 to A4 or Letter (default: A4)");
   app.add_option("--cols", options.cols,
                  "Number of tags or squares along the width (default: 6 tags or 10 squares)")
@@ -169,5 +169,5 @@ int main(int argc, char** argv) {
       "vlp-board");
   vlp::Options options;
   vlp::add_options(app, options);
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(options); });
 }

@@ -35,10 +35,9 @@ void run(Options options) {
   SessionLog log;
   const SessionResult result = [&] {
     try {
-      return run_calibration_session(options.session, options.results, options.how,
-                                     log.make_session_observer());
+      return run_session(options.session, options.results, options.how, log.make_observer());
     } catch (const std::exception& error) {
-      write_refusal_junit_xml(options.results, options.session, error.what());
+      write_refusal_junit(options.results, options.session, error.what());
       throw;
     }
   }();
@@ -46,7 +45,7 @@ void run(Options options) {
     if (result.failure == StepFailure::undetermined) throw Undetermined(result.reason);
     throw std::invalid_argument(result.reason);
   }
-  print_session_result(result, options.results);
+  print_session(result, options.results);
   if (result.verdict == Verdict::fail) throw GateNotMet(result.reason);
 }
 
@@ -77,21 +76,21 @@ int calibrate(int argc, char** argv) {
       kName);
   Options options;
   auto& how = options.how;
-  how.frontend = make_default_image_intake_options();
+  how.frontend = make_intake_options();
   app.add_option("session", options.session, "Input folder of the captures")->required();
   app.add_option("-o,--output", options.results,
                  "Output folder, created if missing: calibration.yaml, check-fixes.csv, "
                  "evaluation.json, report.html, session.json, junit.xml and the files of each step")
       ->required();
   app.add_option("--camera-id", how.camera_id, "Camera id in the calibration (default: camera)");
-  add_lens_model_option(app, options.lens);
+  add_lens_model(app, options.lens);
   app.add_option("--row-time-s", how.frontend.row_time_s,
                  "Row time: time between the readout of successive rows, in s (default: estimated "
                  "from rotation/)")
       ->check(CLI::Range(1e-8, 1e-3));
-  add_readout_direction_option(app, how.frontend.readout);
+  add_readout(app, how.frontend.readout);
   add_room_option(app, how.frontend.room);
-  add_board_image_quality_options(app, how.frontend);
+  add_quality_options(app, how.frontend);
   app.add_option("--gates", how.gates_file,
                  "File of gates, vlp-gates/1, for sessions without gates.yaml. Its gates are added "
                  "to the default gates, or replace them");
@@ -107,11 +106,11 @@ int calibrate(int argc, char** argv) {
       },
       "Read requests from stdin, one line of JSON for each session; see apps/vlp-calibrate.md. "
       "Excludes all other arguments");
-  app.footer("Gates:\n" + describe_metrics(list_session_metric_kinds()));
-  return parse_arguments_and_run(
+  app.footer("Gates:\n" + describe_metrics(list_session_metrics()));
+  return parse_and_run(
       app, argc, argv, [&] { run(options); },
       [&](const std::string& message) {
-        write_refusal_junit_xml(find_option_value(argc, argv, {"-o", "--output"}), {}, message);
+        write_refusal_junit(read_option_value(argc, argv, {"-o", "--output"}), {}, message);
       });
 }
 
@@ -121,8 +120,8 @@ int calibrate(int argc, char** argv) {
 int main(int argc, char** argv) {
   if (argc != 2 || std::string_view(argv[1]) != "--batch-stdin") return vlp::calibrate(argc, argv);
   CLI::App app("", vlp::kName);
-  return vlp::parse_arguments_and_run(app, 1, argv, [] {
-    vlp::load_tag_family_decoder("tag36h11");  // family of most boards
-    vlp::run_program_for_each_stdin_line(vlp::kName, vlp::calibrate);
+  return vlp::parse_and_run(app, 1, argv, [] {
+    vlp::load_tag_family("tag36h11");  // family of most boards
+    vlp::run_each_line(vlp::kName, vlp::calibrate);
   });
 }

@@ -35,9 +35,9 @@ struct Options {
 
 std::string format_camera_file(const Options& options, const Camera& camera,
                                const ImageRegion& region) {
-  if (options.to == "mrcal") return format_mrcal_cameramodel(camera, region);
-  if (options.to == "opencv") return format_opencv_camera(camera);
-  return options.to == "ros" ? format_ros_camera_info(camera) : format_kalibr_camchain(camera);
+  if (options.to == "mrcal") return format_cameramodel(camera, region);
+  if (options.to == "opencv") return format_opencv(camera);
+  return options.to == "ros" ? format_ros(camera) : format_camchain(camera);
 }
 
 /// Returns a report with the calibrated region of the lens only; std::nullopt without a region.
@@ -52,7 +52,7 @@ void print_region(const Options& options, const Camera& camera, const ImageRegio
   if (region.empty()) return;
   const bool kept = options.to == "calibration" || options.to == "mrcal";
   fmt::print("known         in {:.1f} % of the image, which {}\n",
-             100 * compute_region_fraction_of_image_area(region, camera.imager_px),
+             100 * compute_area_fraction(region, camera.imager_px),
              kept ? "is kept" : "the format does not support");
 }
 
@@ -63,14 +63,14 @@ std::vector<BoardView> read_corners(const std::string& file, const Board& board)
              : read_mrcal_corners(file, board, {any, any});
 }
 
-void convert_corner_file(const Options& options) {
+void convert_corners(const Options& options) {
   if (!is_corner_file(options.input) || options.board.empty()) {
     throw std::invalid_argument(
         "--to lamps needs corners of a board (.csv or .vnl) as input, and --board");
   }
   const Board board = read_board(options.board);
-  const CornerLamps lamps = convert_corners_to_lamps(read_corners(options.input, board), board,
-                                                     options.sigma_px, options.sd_m);
+  const CornerLamps lamps =
+      make_corner_lamps(read_corners(options.input, board), board, options.sigma_px, options.sd_m);
   if (lamps.corners == 0) throw InputError(options.input, "has no corner of the board");
   if (lamps.corners_without_sd > 0 && !lamps.sigma_px) {
     throw InputError(options.input,
@@ -80,7 +80,7 @@ void convert_corner_file(const Options& options) {
   const std::filesystem::path folder = options.output;
   std::filesystem::create_directories(folder);
   for (const char* name : {"lamps.yaml", "detections.csv"})
-    check_output_is_not_input((folder / name).string(), {options.input, options.board});
+    check_output_is_no_input((folder / name).string(), {options.input, options.board});
   write_lamp_map(folder / "lamps.yaml", lamps.map);
   write_detections(folder / "detections.csv", lamps.frames);
   fmt::print("lamps         {} corners of the board, in lamps.yaml\n", lamps.map.lamps.size());
@@ -109,29 +109,27 @@ void run(const CLI::App& app, const Options& options) {
     if (app.count(option) > 0 && options.to == "lamps")
       throw std::invalid_argument(std::string(option) + ": not with --to lamps; leave it out");
   }
-  if (options.to == "lamps") return convert_corner_file(options);
-  check_output_is_not_input(options.output, {options.input});
-  const auto [read, region] = read_camera_of_any_format(options.input);
+  if (options.to == "lamps") return convert_corners(options);
+  check_output_is_no_input(options.output, {options.input});
+  const auto [read, region] = read_any_camera(options.input);
   FittedCamera fitted{read, 0, 1};
   const std::string was(lens_model_name(fitted.camera.lens_model));
   if (!options.lens.empty()) {
-    fitted = convert_camera_to_lens_model(fitted.camera, *lens_model_from_name(options.lens));
+    fitted = convert_lens_model(fitted.camera, *lens_model_from_name(options.lens));
   }
   Camera& camera = fitted.camera;
   if (!options.camera_id.empty()) camera.id = options.camera_id;
   if (options.to == "calibration") {
-    write_calibration(
-        options.output,
-        make_camera_only_calibration(camera, make_region_report(region),
-                                     make_history_entry_from_command_line(app, {options.input})));
+    write_calibration(options.output, make_calibration(camera, make_region_report(region),
+                                                       make_command_entry(app, {options.input})));
   } else {
     write_file(options.output, format_camera_file(options, camera, region));
   }
   if (options.to == "calibration") {
     fmt::print("kept          the camera alone; vlp-rotation and vlp-dispersion add the rest\n");
   }
-  fmt::print("camera        {}, {} x {} px\n", escape_text_for_single_line(camera.id),
-             camera.imager_px[0], camera.imager_px[1]);
+  fmt::print("camera        {}, {} x {} px\n", escape_for_line(camera.id), camera.imager_px[0],
+             camera.imager_px[1]);
   if (was == lens_model_name(camera.lens_model)) {
     fmt::print("lens          {}, unchanged\n", was);
   } else {
@@ -191,5 +189,5 @@ int main(int argc, char** argv) {
       });
   app.add_option("--camera-id", options.camera_id,
                  "Camera id in the output (default: that of the input)");
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

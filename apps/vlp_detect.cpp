@@ -32,11 +32,11 @@ std::map<std::string, double> frame_times(const std::vector<Observation>& images
 }
 
 void run(const CaptureOptions& options, const std::string& captures) {
-  const std::vector<std::string> inputs = list_capture_input_files(options);
-  check_output_files_are_distinct(
+  const std::vector<std::string> inputs = list_capture_files(options);
+  check_outputs_distinct(
       {{"--output", options.output}, {"--lights", options.lights}, {"--captures", captures}},
       inputs);
-  reject_frame_step_without_video(options.frontend.every, {options.images});
+  check_frame_step(options.frontend.every, {options.images});
   if (!captures.empty() && !is_video_file_name(options.images)) {
     throw std::invalid_argument("--captures: images have no frame times; use it for a video only");
   }
@@ -47,22 +47,22 @@ void run(const CaptureOptions& options, const std::string& captures) {
     throw std::invalid_argument(
         "lamps cannot be identified; give --calibration, --row-time-s or --classifier");
   }
-  const Observations found = detect_lamps_in_captures(
-      options, ImageUse::fixes, read_lamps_of_room(options.lamps, options.frontend.room),
-      calibration);
-  const std::vector<Frame> frames = collect_lamp_frames_of_kept_images(found.images);
+  const Observations found =
+      detect_captured_lamps(options, ImageUse::fixes,
+                            read_lamps_of_room(options.lamps, options.frontend.room), calibration);
+  const std::vector<Frame> frames = collect_lamp_frames(found.images);
   write_detections(options.output, frames);
   if (!captures.empty()) write_capture_times(captures, frame_times(found.images));
   const auto empty = std::count_if(frames.begin(), frames.end(),
                                    [](const Frame& frame) { return frame.detections.empty(); });
-  const auto count = [&](LightKind kind) { return count_lights_of_kind(found.images, kind); };
+  const auto count = [&](LightKind kind) { return count_lights(found.images, kind); };
   fmt::print("images      {}\n  skipped   {}\n  no lamp   {}\n", found.images.size(),
              found.images.size() - frames.size(), empty);
   fmt::print("lamps       {}\n", count(LightKind::lamp));
   fmt::print("no lamps    {} cut by the image border, {} unknown, {} steady, {} without outline\n",
              count(LightKind::truncated), count(LightKind::unknown), count(LightKind::unmodulated),
              count(LightKind::no_outline));
-  for (const auto& [kind, reason, lights] : count_rejected_lights_by_reason(found.images)) {
+  for (const auto& [kind, reason, lights] : count_rejected_lights(found.images)) {
     fmt::print("  {:<8}  {}, {}: {}\n", lights, light_kind_name(kind), light_reason_name(reason),
                describe_light_reason(reason));
   }
@@ -94,14 +94,14 @@ int main(int argc, char** argv) {
                  "centers are those of ellipses in the image");
   app.add_option("--row-time-s", options.frontend.row_time_s,
                  "Row time of a camera without calibration, in s")
-      ->check(vlp::make_finite_positive_validator())
+      ->check(vlp::make_positive_validator())
       ->excludes("--calibration");
   app.add_option("-o,--output", options.output, "Output file of detections, CSV")->required();
   app.add_option("--lights", options.lights,
                  "Output file of all lights, CSV, with class, reason and measured values");
   std::string captures;
   app.add_option("--captures", captures, "Output file of the frame times of a video, captures.csv");
-  vlp::add_frame_step_option(app, options.frontend.every);
-  vlp::add_lamp_detection_options(app, options);
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options, captures); });
+  vlp::add_frame_step(app, options.frontend.every);
+  vlp::add_lamp_options(app, options);
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(options, captures); });
 }

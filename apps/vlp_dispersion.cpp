@@ -38,7 +38,7 @@ struct Options {
 };
 
 /// Reads the table of the captures, without their reference points if --reference-point gives them.
-CapturesTable read_captures_table(const Options& options) {
+CapturesTable read_captures(const Options& options) {
   CapturesTable captures;
   if (!options.captures.empty()) {
     captures = read_captures_csv(options.captures);
@@ -55,9 +55,9 @@ KnownPositions collect_known_positions(const Options& options, const std::vector
   std::optional<Eigen::Vector2d> reference_point_m;
   if (options.reference_point_m)
     reference_point_m = Eigen::Vector2d(options.reference_point_m->data());
-  KnownPositions places = collect_captures_at_known_positions(
-      frames, captures, reference_point_m,
-      options.of == "axis" ? MeasuredPoint::axis : MeasuredPoint::camera);
+  KnownPositions places =
+      collect_known_captures(frames, captures, reference_point_m,
+                             options.of == "axis" ? MeasuredPoint::axis : MeasuredPoint::camera);
   if (places.captures.empty() && captures.empty()) {
     throw std::invalid_argument(
         "the positions of the captures are unknown; give --reference-point or --captures");
@@ -76,27 +76,26 @@ KnownPositions collect_known_positions(const Options& options, const std::vector
 }
 
 void run(const CLI::App& app, Options options) {
-  std::vector<std::string> inputs = list_capture_input_files(options.images);
+  std::vector<std::string> inputs = list_capture_files(options.images);
   if (!options.captures.empty()) inputs.push_back(options.captures);
   for (const char* table : {"captures.csv", "truth.csv"}) {
     const auto beside = std::filesystem::path(options.images.images) / table;
     if (options.captures.empty() && std::filesystem::exists(beside)) inputs.push_back(beside);
   }
-  check_output_files_are_distinct({{"--output", options.images.output}, {"--plot", options.plot}},
-                                  inputs);
-  const CapturesTable captures = read_captures_table(options);
+  check_outputs_distinct({{"--output", options.images.output}, {"--plot", options.plot}}, inputs);
+  const CapturesTable captures = read_captures(options);
   options.images.captures = captures;
   const LampCaptures input = read_lamp_captures(options.images, ImageUse::known_positions);
-  check_map_contains_captured_lamps(input.frames, input.lamps, input.lamps_file);
+  check_map_has_lamps(input.frames, input.lamps, input.lamps_file);
   const KnownPositions places = collect_known_positions(options, input.frames, captures);
-  const DispersionResult found = run_dispersion_calibration_step(
-      input, places, kMethods.at(options.method), kCircles.at(options.circle),
-      make_history_entry_from_command_line(app, inputs));
+  const DispersionResult found =
+      run_dispersion_step(input, places, kMethods.at(options.method), kCircles.at(options.circle),
+                          make_command_entry(app, inputs));
   print_step_remarks(found);
-  throw_if_step_failed(found);
+  require_success(found);
   if (!options.plot.empty()) write_plot(options.plot, found.drawing());
   write_calibration(options.images.output, found.calibration);
-  print_dispersion_calibration(found.fit, found.calibration, places.captures.size());
+  print_dispersion(found.fit, found.calibration, places.captures.size());
 }
 
 }  // namespace
@@ -147,5 +146,5 @@ int main(int argc, char** argv) {
       ->option_text("mean|enclosing");
   app.add_option("--plot", options.plot,
                  "Output file of a plot of fixes and circles, .png or .svg");
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

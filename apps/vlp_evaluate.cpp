@@ -67,16 +67,15 @@ void check_line(const std::string& option, const std::array<double, 4>& line_m) 
   }
 }
 
-std::vector<MetricKind> list_evaluation_metric_kinds() {
+std::vector<MetricKind> list_all_metric_kinds() {
   return list_metric_kinds({MetricSource::evaluation, MetricSource::reference});
 }
 
 /// Returns the gates of the file and of the command line, which takes precedence.
 std::vector<Gate> parse_gates(const Options& options) {
   std::vector<Gate> gates;
-  if (!options.gates_file.empty())
-    gates = read_gates(options.gates_file, list_evaluation_metric_kinds());
-  return merge_gates(std::move(gates), parse_gates(options.gates, list_evaluation_metric_kinds()));
+  if (!options.gates_file.empty()) gates = read_gates(options.gates_file, list_all_metric_kinds());
+  return merge_gates(std::move(gates), parse_gates(options.gates, list_all_metric_kinds()));
 }
 
 /// Returns the input files, without those of the report; names may be empty.
@@ -95,11 +94,11 @@ void check_files(const Options& options) {
     inputs.push_back(fixes);
     check_line("--track " + fixes, {x0_m, y0_m, x1_m, y1_m});
   }
-  check_output_files_are_distinct({{"--json", options.json},
-                                   {"--junit", options.junit},
-                                   {"--propose-gates", options.proposed_gates},
-                                   {"--report", report.file}},
-                                  inputs);
+  check_outputs_distinct({{"--json", options.json},
+                          {"--junit", options.junit},
+                          {"--propose-gates", options.proposed_gates},
+                          {"--report", report.file}},
+                         inputs);
 }
 
 void check_options(const Options& options, const std::vector<Gate>& gates) {
@@ -131,7 +130,7 @@ void check_options(const Options& options, const std::vector<Gate>& gates) {
   }
 }
 
-double compute_reference_point_radius_m(const Options& options) {
+double compute_point_radius_m(const Options& options) {
   if (options.same_point_mm) return 1e-3 * *options.same_point_mm;
   return compute_same_position_radius_m(
       options.calibration.empty() ? Calibration{} : read_calibration(options.calibration));
@@ -149,13 +148,13 @@ EvaluationInput read_input(const Options& options) {
   if (const auto& line_m = options.line_m; !line_m.empty()) {
     input.line_m = {Eigen::Vector2d{line_m[0], line_m[1]}, Eigen::Vector2d{line_m[2], line_m[3]}};
   }
-  input.reference_point_radius_m = compute_reference_point_radius_m(options);
+  input.reference_point_radius_m = compute_point_radius_m(options);
   if (!options.compare.empty()) {
     input.other_fixes = {options.compare, read_fixes(options.compare)};
     check_accepted_fixes(options.compare);
   }
   if (options.noise_px > 0) {
-    input.crlb_input = {read_overhead_lamps_of_room(options.lamps, options.room),
+    input.crlb_input = {read_overhead_lamps(options.lamps, options.room),
                         read_calibration(options.calibration).camera, options.noise_px};
   }
   input.threads = options.threads;
@@ -178,13 +177,13 @@ std::string render_report(const CLI::App& app, const Options& options, const Eva
     report.page.plots.push_back(read_report_plot(picture));
     inputs.push_back(picture);
   }
-  report.page.evaluation = make_history_entry_from_command_line(app, inputs);
-  return render_evaluation_report_html(std::move(report));
+  report.page.evaluation = make_command_entry(app, inputs);
+  return render_evaluation_html(std::move(report));
 }
 
 /// Returns the text of the file of proposed gates. Throws Undetermined if there are too few units.
-std::string format_proposed_gates(const EvaluationInput& input, const Evaluation& evaluation) {
-  const std::vector<Gate> gates = propose_gates_from_evaluation(input, evaluation);
+std::string format_proposal(const EvaluationInput& input, const Evaluation& evaluation) {
+  const std::vector<Gate> gates = propose_gates(input, evaluation);
   if (gates.empty()) {
     // [GATE-2] `to propose gates`
     throw Undetermined(
@@ -196,16 +195,16 @@ std::string format_proposed_gates(const EvaluationInput& input, const Evaluation
 }
 
 /// Returns a test with the warnings, and those of the gates.
-std::vector<JUnitTest> make_evaluation_tests(const EvaluateResult& found) {
-  std::vector<JUnitTest> tests = make_junit_tests_from_gates(found.gates);
+std::vector<JUnitTest> make_junit_tests(const EvaluateResult& found) {
+  std::vector<JUnitTest> tests = make_gate_tests(found.gates);
   tests.insert(tests.begin(), {"evaluation", JUnitTest::Result::passed, "", "", found.warnings});
   return tests;
 }
 
 void run_evaluation(const CLI::App& app, const Options& options, const std::vector<Gate>& gates) {
   const EvaluationInput input = read_input(options);
-  const EvaluateResult found = evaluate_fixes_against_truth(input, gates);
-  throw_if_step_failed(found);
+  const EvaluateResult found = evaluate_with_truth(input, gates);
+  require_success(found);
   for (const CheckedMetric& gate : found.gates) {
     if (gate.value) continue;
     throw std::invalid_argument(
@@ -215,16 +214,16 @@ void run_evaluation(const CLI::App& app, const Options& options, const std::vect
   }
   std::string report, proposed;
   if (!options.report.file.empty()) report = render_report(app, options, input, found);
-  if (!options.proposed_gates.empty()) proposed = format_proposed_gates(input, found.evaluation);
+  if (!options.proposed_gates.empty()) proposed = format_proposal(input, found.evaluation);
   if (!options.json.empty())
-    write_file(options.json, format_evaluation_json(found.evaluation, found.gates));
+    write_file(options.json, format_evaluation(found.evaluation, found.gates));
   if (!options.junit.empty()) {
-    write_file(options.junit, format_junit_xml(kName, make_evaluation_tests(found)));
+    write_file(options.junit, format_junit_xml(kName, make_junit_tests(found)));
   }
   if (!report.empty()) write_file(options.report.file, report);
   if (!proposed.empty()) write_file(options.proposed_gates, proposed);
   print_step_remarks(found);
-  print_fix_error_evaluation(found.evaluation, found.gates);
+  print_evaluation(found.evaluation, found.gates);
   const std::string failed = describe_failed_gates(found.gates);
   if (!failed.empty()) throw GateNotMet(failed);
 }
@@ -292,7 +291,7 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--same-point-mm", options.same_point_mm,
                  "Maximum distance between true positions of one reference point, in mm "
                  "(default: 1 plus twice the lever arm of --calibration)")
-      ->check(make_finite_positive_validator());
+      ->check(make_positive_validator());
   app.add_option("--compare", options.compare,
                  "Other fixes of the same captures, fixes.csv. Reports better, worse, equivalent "
                  "(within 1 um or 1 % of their mean error, whichever is larger) or inconclusive "
@@ -324,7 +323,7 @@ void add_options(CLI::App& app, Options& options) {
   auto* noise = app.add_option("--noise-px", options.noise_px,
                                "Standard deviation of lamp positions in the image, per axis, in "
                                "px. Computes the CRLB")
-                    ->check(make_finite_positive_validator());
+                    ->check(make_positive_validator());
   noise->needs(lamps)->needs(calibration);
   add_report_options(app, options.report);
   add_threads_option(app, options.threads,
@@ -350,11 +349,11 @@ int main(int argc, char** argv) {
       vlp::kName);
   vlp::Options options;
   vlp::add_options(app, options);
-  app.footer("Gates:\n" + vlp::describe_metrics(vlp::list_evaluation_metric_kinds()));
-  return vlp::parse_arguments_and_run(
+  app.footer("Gates:\n" + vlp::describe_metrics(vlp::list_all_metric_kinds()));
+  return vlp::parse_and_run(
       app, argc, argv, [&] { vlp::run(app, options); },
       [&](const std::string& message) {
-        vlp::write_junit_error(vlp::find_option_value(argc, argv, {"--junit"}), "bad_input",
+        vlp::write_junit_error(vlp::read_option_value(argc, argv, {"--junit"}), "bad_input",
                                message);
       });
 }

@@ -39,7 +39,7 @@ struct Options {
   std::string board, output, corners, ros, kalibr, opencv, plot;
   std::optional<std::array<int, 2>> imager_px;
   std::string camera_id = "camera", lens = "LENSMODEL_OPENCV8";
-  FrontendOptions frontend = make_default_image_intake_options();
+  FrontendOptions frontend = make_intake_options();
   std::optional<double> pixel_pitch_m;
   int held_out = 0;
   WarpChoice warp = WarpChoice::automatic;
@@ -93,9 +93,8 @@ Observations observe(const std::vector<std::filesystem::path>& images, const Boa
     return read_board_views(corners, board, options.board, *options.imager_px, options.frontend);
   }
   Progress progress("images");
-  return detect_boards_in_images(
-      images, board, options.board, options.frontend,
-      [&](std::size_t done, std::size_t total) { progress.update_progress_display(done, total); });
+  return detect_boards(images, board, options.board, options.frontend,
+                       [&](std::size_t done, std::size_t total) { progress.update(done, total); });
 }
 
 /// Replaces the extension: camera.yaml and ".cameramodel" give camera.cameramodel.
@@ -104,9 +103,9 @@ std::string replace_extension(const std::string& output, const char* ending) {
 }
 
 void write_exports(const Options& options, const Camera& camera) {
-  if (!options.ros.empty()) write_file(options.ros, format_ros_camera_info(camera));
-  if (!options.kalibr.empty()) write_file(options.kalibr, format_kalibr_camchain(camera));
-  if (!options.opencv.empty()) write_file(options.opencv, format_opencv_camera(camera));
+  if (!options.ros.empty()) write_file(options.ros, format_ros(camera));
+  if (!options.kalibr.empty()) write_file(options.kalibr, format_camchain(camera));
+  if (!options.opencv.empty()) write_file(options.opencv, format_opencv(camera));
 }
 
 bool chooses_lens(const Options& options) { return options.lens == kAutomaticLens; }
@@ -127,19 +126,19 @@ void check_names(const std::vector<std::filesystem::path>& images) {
 void check_exports(const Options& options, Camera camera) {
   camera.imager_px = {1, 1};
   camera.intrinsics.assign(num_lens_parameters(camera.lens_model), 1);
-  if (!options.ros.empty()) format_ros_camera_info(camera);
-  if (!options.kalibr.empty()) format_kalibr_camchain(camera);
-  if (!options.opencv.empty()) format_opencv_camera(camera);
+  if (!options.ros.empty()) format_ros(camera);
+  if (!options.kalibr.empty()) format_camchain(camera);
+  if (!options.opencv.empty()) format_opencv(camera);
 }
 
 /// Returns the default gates with the changes of the command line.
 std::vector<Gate> parse_gates(const Options& options) {
-  return merge_gates(make_default_lens_gates(),
+  return merge_gates(make_lens_gates(),
                      parse_gates(options.gates, list_metric_kinds({MetricSource::lens})));
 }
 
 /// Returns true if a gate of the lens fails, not only gates of the views.
-bool has_failed_lens_gate(const std::vector<CheckedMetric>& gates) {
+bool has_failed_gate(const std::vector<CheckedMetric>& gates) {
   return std::ranges::any_of(gates, [](const CheckedMetric& gate) {
     return !gate.has_passed_gate() &&
            (gate.name == "rms_px" || gate.name == "expected_max_error_px" ||
@@ -151,9 +150,9 @@ bool has_failed_lens_gate(const std::vector<CheckedMetric>& gates) {
 void write_results(const Options& options, const LensResult& result) {
   const LensEstimate& lens = result.lens;
   write_calibration(options.output, result.calibration);
-  if (is_lens_model_supported_by_mrcal(result.calibration.camera.lens_model)) {
-    write_mrcal_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution,
-                            lens.report.region);
+  if (can_mrcal_solve(result.calibration.camera.lens_model)) {
+    write_cameramodel(replace_extension(options.output, ".cameramodel"), lens.solution,
+                      lens.report.region);
   } else {
     // A file of an earlier run would belong to another lens.
     std::filesystem::remove(replace_extension(options.output, ".cameramodel"));
@@ -165,17 +164,17 @@ void write_results(const Options& options, const LensResult& result) {
 }
 
 /// Throws GateNotMet with a remedy if a gate fails.
-void throw_if_gate_failed(const std::vector<Gate>& gates, const LensResult& result) {
+void require_gates_passed(const std::vector<Gate>& gates, const LensResult& result) {
   const LensEstimate& lens = result.lens;
   const auto checked = check_gates(gates, result.metrics);
   const std::string failed = describe_failed_gates(checked);
   if (failed.empty()) return;
-  if (lens.better_model && has_failed_lens_gate(checked)) {
+  if (lens.better_model && has_failed_gate(checked)) {
     throw GateNotMet(fmt::format("{}; use --lens {}", failed, lens_model_name(*lens.better_model)));
   }
   if (std::isfinite(lens.report.uncertainty_worst_px)) {
     throw GateNotMet(
-        fmt::format("{}; add views, next {}", failed, recommend_next_board_view(lens.coverage)));
+        fmt::format("{}; add views, next {}", failed, recommend_next_view(lens.coverage)));
   }
   throw GateNotMet(
       fmt::format("{}; the estimated lens has no rays in part of the image: use another lens "
@@ -184,7 +183,7 @@ void throw_if_gate_failed(const std::vector<Gate>& gates, const LensResult& resu
 }
 
 /// Prints the components of the uncertainty other than noise.
-void print_uncertainty_components(const LensEstimate& lens) {
+void print_uncertainty(const LensEstimate& lens) {
   if (const auto& model = lens.model_uncertainty) {
     fmt::print(
         "model choice  {:.3f} px mean, {:.3f} px worst: differences to models that the views do "
@@ -209,12 +208,12 @@ void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = parse_gates(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
   const std::string corners = corner_file(app, options);
-  reject_frame_step_without_video(options.frontend.every, options.images);
-  const auto images = corners.empty() ? replace_folders_by_images(options.images)
+  check_frame_step(options.frontend.every, options.images);
+  const auto images = corners.empty() ? expand_folders(options.images)
                                       : std::vector<std::filesystem::path>{options.images.front()};
   std::vector<std::string> inputs{options.board};
   for (const auto& image : images) inputs.push_back(image.string());
-  check_output_files_are_distinct(
+  check_outputs_distinct(
       {{"--output", options.output},
        {"--output's .cameramodel", replace_extension(options.output, ".cameramodel")},
        {"--output's .corners.vnl", replace_extension(options.output, ".corners.vnl")},
@@ -226,7 +225,7 @@ void run(const CLI::App& app, const Options& options) {
       inputs);
   if (!options.corners.empty()) check_names(images);
   const Board board = read_board(options.board);
-  select_board_warp_model(board, options.warp);  // throws before the images are read
+  select_board_warp(board, options.warp);  // throws before the images are read
   LensInput input{observe(images, board, corners, options),
                   board,
                   options.board,
@@ -235,20 +234,19 @@ void run(const CLI::App& app, const Options& options) {
                   options.warp,
                   chooses_lens(options)};
   // After the images: unusable files are not read for their digests.
-  const LensResult result = run_lens_calibration_step(
-      std::move(input), make_history_entry_from_command_line(app, inputs));
+  const LensResult result = run_lens_step(std::move(input), make_command_entry(app, inputs));
   print_step_remarks(result);
   const LensEstimate& lens = result.lens;
   if (!options.corners.empty() && !lens.views.empty()) {
     write_corner_table(options.corners, lens.views, board);
   }
-  throw_if_step_failed(result);
+  require_success(result);
   check_exports(options, result.calibration.camera);  // the selected lens model
   write_results(options, result);
-  if (lens.choice) fmt::print("lens model    {}\n", describe_lens_model_choice(*lens.choice));
-  print_lens_calibration(lens.solution, lens.report, lens.coverage, lens.held_out);
-  print_uncertainty_components(lens);
-  throw_if_gate_failed(gates, result);
+  if (lens.choice) fmt::print("lens model    {}\n", describe_choice(*lens.choice));
+  print_lens(lens.solution, lens.report, lens.coverage, lens.held_out);
+  print_uncertainty(lens);
+  require_gates_passed(gates, result);
 }
 
 void add_input_options(CLI::App& app, Options& options) {
@@ -265,12 +263,12 @@ void add_input_options(CLI::App& app, Options& options) {
       ->required();
   app.add_option("--camera-id", options.camera_id,
                  "Camera id in the calibration (default: camera)");
-  add_lens_model_option(app, options.lens);
+  add_lens_model(app, options.lens);
   app.add_option("--row-time-s", options.frontend.row_time_s,
                  "Row time: time between the readout of successive rows, in s. Needed to identify "
                  "lamps by frequency; vlp-train --row-time estimates it")
       ->check(CLI::Range(1e-8, 1e-3));
-  add_readout_direction_option(app, options.frontend.readout);
+  add_readout(app, options.frontend.readout);
   app.add_option("--imager-px", options.imager_px,
                  "Width and height of the images of a corner file, in px")
       ->check(CLI::Range(16, 100000))
@@ -281,7 +279,7 @@ void add_solve_options(CLI::App& app, Options& options) {
   app.add_option("--corners", options.corners,
                  "Output file of the detected corners, .csv. It can replace the images in a later "
                  "calibration")
-      ->check(make_file_extension_validator(".csv"));
+      ->check(make_extension_validator(".csv"));
   app.add_option("--pixel-pitch-m", options.pixel_pitch_m, "Pixel pitch of the imager, in m")
       ->check(CLI::Range(1e-7, 1e-4));
   app.add_option("--held-out", options.held_out,
@@ -321,9 +319,9 @@ void add_output_options(CLI::App& app, Options& options) {
       ->check(make_plot_file_validator());
   app.add_option("--cache", options.frontend.corner_cache,
                  "Folder for the detected corners of each image, which later runs reuse");
-  add_frame_step_option(app, options.frontend.every);
+  add_frame_step(app, options.frontend.every);
   add_max_mpx_option(app, options.frontend.max_mpx);
-  add_board_image_quality_options(app, options.frontend);
+  add_quality_options(app, options.frontend);
   add_threads_option(app, options.frontend.threads);
 }
 
@@ -344,5 +342,5 @@ int main(int argc, char** argv) {
   vlp::add_input_options(app, options);
   vlp::add_solve_options(app, options);
   vlp::add_output_options(app, options);
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

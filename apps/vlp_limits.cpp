@@ -49,10 +49,10 @@ std::string make_title(const Options& options) {
 }
 
 /// Returns the errors that calibration and map report.
-UnitErrors make_reported_errors(const Options& options, const LampMap& lamps,
-                                const Calibration& calibration) {
+UnitErrors make_unit_errors(const Options& options, const LampMap& lamps,
+                            const Calibration& calibration) {
   UnitErrors unit(lamps, calibration);
-  if (!unit.common_errors().are_any_errors_known()) {
+  if (!unit.common_errors().has_known_errors()) {
     throw InputError(options.calibration,
                      "has no uncertainties, and " + options.lamps +
                          " has no sd_m; use --principal-point-px, --tilt-deg and --lamp-map-mm "
@@ -62,7 +62,7 @@ UnitErrors make_reported_errors(const Options& options, const LampMap& lamps,
                                                                       "lamp map"};
   std::string unstated;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (unit.common_errors().is_error_source_known_or_absent(kCommonErrorSources[i])) continue;
+    if (unit.common_errors().is_known_or_absent(kCommonErrorSources[i])) continue;
     unstated.append(unstated.empty() ? "" : ", ").append(names[i]);
   }
   if (!unstated.empty()) {
@@ -72,7 +72,7 @@ UnitErrors make_reported_errors(const Options& options, const LampMap& lamps,
   }
   if (const int elsewhere = unit.common_errors().num_lamps_moved_since_calibration();
       elsewhere > 0) {
-    spdlog::warn(describe_lamps_moved_since_calibration(elsewhere));
+    spdlog::warn(describe_moved_lamps(elsewhere));
   }
   return unit;
 }
@@ -81,7 +81,7 @@ UnitErrors make_reported_errors(const Options& options, const LampMap& lamps,
 BodyPrior make_body_prior(const Options& options, const Camera& camera) {
   BodyPrior prior;
   if (const auto motion = options.motion.make_motion_prior()) {
-    check_row_time_and_readout_known(camera);
+    check_timing_known(camera);
     prior.set_sd(kBodyVelocity, motion->velocity_sd_m_per_s);
     prior.set_sd(kBodyYawRate, motion->yaw_rate_sd_rad_per_s);
   }
@@ -89,31 +89,30 @@ BodyPrior make_body_prior(const Options& options, const Camera& camera) {
   return prior;
 }
 
-FloorLimits find_floor_limits(const Options& options, const LampMap& lamps, const FloorGrid& grid) {
+FloorLimits compute_limits(const Options& options, const LampMap& lamps, const FloorGrid& grid) {
   const Calibration calibration = read_calibration(options.calibration);
   const BodyPrior prior = make_body_prior(options, calibration.camera);
   const double yaw_rad = rad_from_deg(options.yaw_deg);
   if (options.stated) {
-    return compute_accuracy_limits_on_floor(make_reported_errors(options, lamps, calibration), grid,
-                                            options.height_m, yaw_rad, options.noise_px, prior);
+    return compute_floor_limits(make_unit_errors(options, lamps, calibration), grid,
+                                options.height_m, yaw_rad, options.noise_px, prior);
   }
-  return compute_accuracy_limits_on_floor(
-      lamps, calibration.camera, grid, options.height_m, yaw_rad,
-      {options.noise_px, options.center_px, rad_from_deg(options.tilt_deg),
-       1e-3 * options.lamp_map_mm},
-      prior);
+  return compute_floor_limits(lamps, calibration.camera, grid, options.height_m, yaw_rad,
+                              {options.noise_px, options.center_px, rad_from_deg(options.tilt_deg),
+                               1e-3 * options.lamp_map_mm},
+                              prior);
 }
 
 void run(const Options& options) {
-  check_output_files_are_distinct({{"--map", options.map}, {"--picture", options.picture}},
-                                  {options.lamps, options.calibration});
-  const LampMap lamps = read_overhead_lamps_of_room(options.lamps, options.room);
-  FloorGrid grid = make_grid_of_floor_positions(lamps, options.step_m);
+  check_outputs_distinct({{"--map", options.map}, {"--picture", options.picture}},
+                         {options.lamps, options.calibration});
+  const LampMap lamps = read_overhead_lamps(options.lamps, options.room);
+  FloorGrid grid = make_floor_grid(lamps, options.step_m);
   if (const auto& floor = options.floor_m; !floor.empty()) {
     grid = {floor[0], floor[1], floor[2], floor[3], options.step_m};
   }
-  const FloorLimits limits = find_floor_limits(options, lamps, grid);
-  const auto summary = summarize_floor_limits(limits);
+  const FloorLimits limits = compute_limits(options, lamps, grid);
+  const auto summary = summarize_limits(limits);
   const bool is_free = options.motion.max_speed_m_per_s || options.roll_pitch_sd_deg > 0;
   if (!summary && is_free &&
       std::any_of(limits.positions.begin(), limits.positions.end(),
@@ -128,13 +127,13 @@ void run(const Options& options) {
         "two lamps are visible from no position on this floor: is it under the lamps, and the "
         "camera below them? Otherwise lower the camera, widen the lens, or add lamps");
   }
-  if (!options.map.empty()) write_floor_accuracy_limits(options.map, limits);
+  if (!options.map.empty()) write_floor_limits(options.map, limits);
   if (!options.picture.empty()) {
-    write_floor_plot(options.picture,
-                     collect_floor_plot_data(limits, make_title(options), options.step_m), lamps);
+    write_floor_plot(options.picture, make_floor_plot(limits, make_title(options), options.step_m),
+                     lamps);
   }
-  print_floor_error_budget(*summary, limits, is_free);
-  if (options.stated) print_largest_error_source(*summary);
+  print_floor_budget(*summary, limits, is_free);
+  if (options.stated) print_largest_source(*summary);
 }
 
 void add_options(CLI::App& app, Options& options) {
@@ -149,20 +148,20 @@ void add_options(CLI::App& app, Options& options) {
   app.add_option("--noise-px", options.noise_px,
                  "Standard deviation of lamp positions in the image, per axis, in px")
       ->required()
-      ->check(make_finite_positive_validator());
+      ->check(make_positive_validator());
   auto* center =
       app.add_option("--principal-point-px", options.center_px,
                      "Standard deviation of the principal point, per axis, in px (default: 0)")
-          ->check(make_finite_non_negative_validator());
+          ->check(make_non_negative_validator());
   auto* tilt =
       app.add_option("--tilt-deg", options.tilt_deg,
                      "Standard deviation of the camera tilt, per axis, in degrees (default: 0)")
-          ->check(make_finite_non_negative_validator());
+          ->check(make_non_negative_validator());
   auto* lamp_map =
       app.add_option(
              "--lamp-map-mm", options.lamp_map_mm,
              "Standard deviation of lamp positions in the map, per axis, in mm (default: 0)")
-          ->check(make_finite_non_negative_validator());
+          ->check(make_non_negative_validator());
   app.add_flag("--from-calibration", options.stated,
                "Use the uncertainties of lens, zenith and dispersion offset in the calibration "
                "instead of these three options. Those of the lamps are sd_m of the map, or from "
@@ -170,14 +169,14 @@ void add_options(CLI::App& app, Options& options) {
       ->excludes(center)
       ->excludes(tilt)
       ->excludes(lamp_map);
-  add_motion_limit_options(
+  add_motion_options(
       app, options.motion,
       "Maximum speed of the camera, in m/s. Adds the contribution of estimating velocity and yaw "
       "rate (default: 0). With odometry of standard deviation S m/s, use 2 S");
   app.add_option("--roll-pitch-sd-deg", options.roll_pitch_sd_deg,
                  "Standard deviation of roll and pitch, in degrees. Adds the contribution of "
                  "estimating both (default: 0, known); 90: unknown")
-      ->check(make_finite_non_negative_validator());
+      ->check(make_non_negative_validator());
   app.add_option("--yaw-deg", options.yaw_deg, "Yaw of the camera, in degrees (default: 0)")
       ->check(make_finite_validator());
   app.add_option("--floor-m", options.floor_m,
@@ -186,7 +185,7 @@ void add_options(CLI::App& app, Options& options) {
       ->check(make_finite_validator())
       ->option_text("X_MIN X_MAX Y_MIN Y_MAX");
   app.add_option("--step-m", options.step_m, "Grid spacing on the floor, in m (default: 0.05)")
-      ->check(make_finite_positive_validator());
+      ->check(make_positive_validator());
   app.add_option("--map", options.map, "Output file of the error budget at each position, CSV");
   app.add_option(
          "--picture", options.picture,
@@ -210,5 +209,5 @@ int main(int argc, char** argv) {
       "vlp-limits");
   vlp::Options options;
   vlp::add_options(app, options);
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(options); });
 }

@@ -47,11 +47,10 @@ struct Options {
 };
 
 /// Reads the table of the captures: the named file, or the one in the folder of images.
-CapturesTable read_captures_table(const Options& options) {
+CapturesTable read_captures(const Options& options) {
   if (!options.captures.empty()) return read_captures_csv(options.captures);
   const bool folder = std::filesystem::is_directory(options.images.images);
-  CapturesTable captures =
-      folder ? read_captures_csv_of_folder(options.images.images) : CapturesTable{};
+  CapturesTable captures = folder ? read_folder_captures(options.images.images) : CapturesTable{};
   if (captures.empty() &&
       (options.one_lamp || options.inclination_sigma_deg || options.height_sd_m ||
        options.yaw_rate_sd_deg_per_s || options.window_size > 1)) {
@@ -111,33 +110,29 @@ LocateInput make_input(const Options& options, const CapturesTable& captures) {
 }
 
 LocateResult locate_in_images(const Options& options, LocateInput input) {
-  check_outputs_are_not_images(options.images);
-  const LampImages images =
-      make_lamp_detection_input(options.images, input.lamps, input.calibration);
+  check_outputs(options.images);
+  const LampImages images = make_lamp_images(options.images, input.lamps, input.calibration);
   LocateResult found;
   {
     Progress progress("images");
-    found = locate_camera_from_images(images, ImageUse::fixes, std::move(input),
-                                      options.images.frontend,
-                                      [&](std::size_t done, std::size_t total) {
-                                        progress.update_progress_display(done, total);
-                                      });
+    found = locate_from_images(
+        images, ImageUse::fixes, std::move(input), options.images.frontend,
+        [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
-  print_detected_lights(found.observations);
+  print_lights(found.observations);
   return found;
 }
 
 void run(Options options) {
-  std::vector<std::string> inputs = list_capture_input_files(options.images);
+  std::vector<std::string> inputs = list_capture_files(options.images);
   inputs.push_back(options.captures);
-  check_output_files_are_distinct({{"--output", options.images.output}, {"--poses", options.poses}},
-                                  inputs);
+  check_outputs_distinct({{"--output", options.images.output}, {"--poses", options.poses}}, inputs);
   if (!options.poses.empty() && !options.roll_pitch_sd_deg && !options.inclination_sigma_deg) {
     throw std::invalid_argument(
         "--poses needs estimated roll and pitch; give --roll-pitch-sd-deg or "
         "--inclination-sigma-deg");
   }
-  const CapturesTable captures = read_captures_table(options);
+  const CapturesTable captures = read_captures(options);
   options.images.captures = captures;
   if (const auto& mount = options.camera_on_robot) {
     options.images.yaw_in_robot_rad = rad_from_deg((*mount)[3]);
@@ -147,15 +142,15 @@ void run(Options options) {
   if (std::filesystem::is_directory(options.images.images)) {
     found = locate_in_images(options, std::move(input));
   } else {
-    input.frames = read_captures_from_detections_file(options.images);
-    found = locate_camera_from_detections(input);
+    input.frames = read_detected_captures(options.images);
+    found = locate_from_detections(input);
   }
   print_step_remarks(found);
-  if (found.rows.empty()) throw_if_step_failed(found);
+  if (found.rows.empty()) require_success(found);
   write_fixes(options.images.output, found.rows);
   if (!options.poses.empty()) write_poses(options.poses, found.poses);
-  print_position_fix_summary(found.summary);
-  throw_if_step_failed(found);
+  print_fix_summary(found.summary);
+  require_success(found);
 }
 
 /// Adds the options of motion, roll and pitch, mount, and of the values in captures.csv.
@@ -163,7 +158,7 @@ void add_sensor_options(CLI::App& app, Options& options) {
   app.add_option("--inclination-sigma-deg", options.inclination_sigma_deg,
                  "Standard deviation of each angle of the inclination sensor, in degrees. Roll and "
                  "pitch are then estimated together with the position (default: 0, exact)")
-      ->check(make_finite_non_negative_validator());
+      ->check(make_non_negative_validator());
   app.add_option("--camera-on-robot", options.camera_on_robot,
                  "Position and yaw of the camera in the frame of the robot, in m and degrees. "
                  "Fixes and poses are then of the robot center")
@@ -175,23 +170,22 @@ void add_sensor_options(CLI::App& app, Options& options) {
   app.add_option("--yaw-sd-deg", options.yaw_sd_deg,
                  "Standard deviation of yaw_rad in captures.csv for --one-lamp, in degrees "
                  "(default: 0, exact). For z_m use --height-sd-m")
-      ->check(make_finite_non_negative_validator())
+      ->check(make_non_negative_validator())
       ->needs(one_lamp);
-  add_motion_limit_options(
-      app, options.motion,
-      "Maximum speed of the camera or robot, in m/s. Estimates the motion of each "
-      "capture unless captures.csv has it (default: motion of captures.csv, or 0)");
-  add_yaw_rate_sd_option(app, options.yaw_rate_sd_deg_per_s);
+  add_motion_options(app, options.motion,
+                     "Maximum speed of the camera or robot, in m/s. Estimates the motion of each "
+                     "capture unless captures.csv has it (default: motion of captures.csv, or 0)");
+  add_yaw_rate_sd(app, options.yaw_rate_sd_deg_per_s);
   app.add_option("--roll-pitch-sd-deg", options.roll_pitch_sd_deg,
                  "Standard deviation of roll and pitch about level, in degrees, for captures "
                  "without inclination. Estimates both from each image; 90: unknown, needs three "
                  "lamps or more (default: 0, level)")
-      ->check(make_finite_non_negative_validator());
+      ->check(make_non_negative_validator());
   app.add_option("--height-sd-m", options.height_sd_m,
                  "Standard deviation of z_m in captures.csv, in m. All fixes then use z_m, which "
                  "also selects among several solutions for three lamps (default: only --one-lamp "
                  "uses z_m, as exact)")
-      ->check(make_finite_positive_validator());
+      ->check(make_positive_validator());
   app.add_option("--window", options.window_size,
                  "Number of captures in a joint fix with one velocity (default: 1). 2 includes the "
                  "previous capture if its time_s in captures.csv is within 0.2 s")
@@ -238,5 +232,5 @@ int main(int argc, char** argv) {
       "vlp-locate");
   vlp::Options options;
   vlp::add_options(app, options);
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(options); });
 }

@@ -24,14 +24,14 @@ void run(const CLI::App& app, const Options& options) {
   if (options.method == "lamps") {
     if (!options.plot.empty())
       throw std::invalid_argument("--plot: not available with --method lamps; leave it out");
-    return run_tilt_calibration_program(app, options.images, options.level);
+    return run_tilt_program(app, options.images, options.level);
   }
   for (const char* of_lamps : {"--refine-map", "--captures", "--max-speed-m-per-s",
                                "--max-yaw-rate-deg-per-s", "--yaw-rate-sd-deg-per-s"}) {
     if (app.count(of_lamps) == 0) continue;
     throw std::invalid_argument(std::string(of_lamps) + " needs --method lamps");
   }
-  run_rotation_center_program(app, options.images, options.method, options.plot);
+  run_rotation_program(app, options.images, options.method, options.plot);
 }
 
 }  // namespace
@@ -72,13 +72,13 @@ int main(int argc, char** argv) {
                  "Table of captures, captures.csv: image, vx_m_per_s, vy_m_per_s, "
                  "yaw_rate_rad_per_s, velocity_sd_m_per_s (odometry in the level frame of the "
                  "camera). Only with --method lamps (default: captures.csv in the folder)");
-  vlp::add_motion_limit_options(
+  vlp::add_motion_options(
       app, options.level.motion,
       "Maximum speed of the camera, in m/s. Estimates the motion of each capture unless "
       "captures.csv has it. Only with --method lamps (default: motion of captures.csv, or 0)");
-  vlp::add_yaw_rate_sd_option(app, options.level.yaw_rate_sd_deg_per_s);
+  vlp::add_yaw_rate_sd(app, options.level.yaw_rate_sd_deg_per_s);
   app.add_option("--plot", options.plot,
                  "Output file of a plot of lamps, circles, rotation center and principal point, "
                  ".png or .svg. Not with --method lamps");
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(app, options); });
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(app, options); });
 }

@@ -29,29 +29,27 @@ struct Options {
 };
 
 void run(const Options& options) {
-  check_output_is_not_input((std::filesystem::path(options.output) / "scene.yaml").string(),
-                            {options.scene});
+  check_output_is_no_input((std::filesystem::path(options.output) / "scene.yaml").string(),
+                           {options.scene});
   Scene scene = read_scene_file(options.scene);
   std::optional<std::uint64_t> seed;
   if (options.seed) {
     seed = scene.seed = static_cast<std::uint64_t>(*options.seed);
-    draw_random_scene_parts(scene);
+    draw_random_parts(scene);
   }
   cv::setNumThreads(1);  // captures are rendered in parallel
   const std::string what = options.archive ? "sessions" : "captures";
-  const SimulationOptions how{
-      options.folders, options.threads,
-      make_simulation_provenance(options.scene, seed, "vlp-simulate", VLP_VERSION)};
+  const SimulationOptions how{options.folders, options.threads,
+                              make_provenance(options.scene, seed, "vlp-simulate", VLP_VERSION)};
   SimulationSummary summary;
   {
     Progress progress(what);
     const auto show = [&](const SimulationSummary& so_far, std::size_t total) {
-      progress.update_progress_display(so_far.rendered + so_far.existing, total, so_far.existing);
+      progress.update(so_far.rendered + so_far.existing, total, so_far.existing);
     };
-    summary = options.archive
-                  ? simulate_session_archive(scene, static_cast<std::size_t>(*options.archive),
-                                             options.output, how, show)
-                  : render_scene_to_folder(scene, options.output, how, show);
+    summary = options.archive ? simulate_archive(scene, static_cast<std::size_t>(*options.archive),
+                                                 options.output, how, show)
+                              : render_scene(scene, options.output, how, show);
   }
   for (const std::string& warning : summary.warnings) spdlog::warn("{}", warning);
   fmt::print("rendered {} {}, {} existed; in {}\n", summary.rendered, what, summary.existing,
@@ -87,5 +85,5 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "Random seed (default: that of the scene)")
       ->check(CLI::Range(0, std::numeric_limits<int>::max()));
   vlp::add_threads_option(app, options.threads, "Number of captures to render in parallel");
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] { vlp::run(options); });
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(options); });
 }

@@ -46,7 +46,7 @@ void add_run_command(CLI::App& app, StationRunOptions& options) {
   run->add_option("--idle-s", options.idle_s,
                   "Time without a new image until the verdict, in s. With --source, rejected "
                   "frames do not count as new")
-      ->check(make_finite_positive_validator());
+      ->check(make_positive_validator());
   add_operator_options(*run, options);
   add_threads_option(*run, options.threads);
 }
@@ -71,10 +71,9 @@ void add_hook_command(CLI::App& app, StationRunOptions& options) {
 
 /// Refuses a password: all users of the machine see command lines.
 std::string describe_password_problem(const std::string& where) {
-  return contains_database_password(where)
-             ? "a password on the command line is visible to all users of the "
-               "machine; set the variable PGPASSWORD, or PGPASSFILE to a file"
-             : "";
+  return contains_password(where) ? "a password on the command line is visible to all users of the "
+                                    "machine; set the variable PGPASSWORD, or PGPASSFILE to a file"
+                                  : "";
 }
 
 /// Adds a command with the options for the location of records.
@@ -118,7 +117,7 @@ CLI::App* add_records_command(CLI::App& app, const char* name, const char* what,
 }
 
 /// Adds the commands that print or write the record of a run.
-void add_commands_of_a_run(CLI::App& app, StationRecordsOptions& options) {
+void add_run_commands(CLI::App& app, StationRecordsOptions& options) {
   add_records_command(app, "list", "List runs, one per line", options);
   auto* show = add_records_command(app, "show", "Print all data of a run", options);
   show->add_option("run", options.run, "Id of the run (default: the last run)");
@@ -232,24 +231,24 @@ void run_command(const CLI::App& app, const StationRunOptions& run,
                  const StationRecordsOptions& records) {
   if (app.got_subcommand("run")) {
     if (run.camera_id.empty()) {
-      measure_units_with_scanned_ids(run);
+      measure_scanned_units(run);
     } else {
-      measure_camera_unit(run);
+      measure_unit(run);
     }
   }
-  if (app.got_subcommand("verify")) verify_station_with_golden_unit(run);
-  if (app.got_subcommand("hook")) rerun_unfinished_hooks(run);
-  if (app.got_subcommand("list")) print_station_run_list(records);
-  if (app.got_subcommand("show")) print_station_run_details(records);
+  if (app.got_subcommand("verify")) verify_with_golden(run);
+  if (app.got_subcommand("hook")) rerun_hooks(run);
+  if (app.got_subcommand("list")) print_runs(records);
+  if (app.got_subcommand("show")) print_run(records);
   if (app.got_subcommand("restore")) restore_run_files(records);
-  if (app.got_subcommand("certificate")) write_calibration_certificate(records);
-  if (app.got_subcommand("clean")) list_or_delete_expired_run_folders(records);
+  if (app.got_subcommand("certificate")) write_certificate(records);
+  if (app.got_subcommand("clean")) list_or_delete_expired(records);
   if (app.got_subcommand("void")) void_recorded_run(records);
-  if (app.got_subcommand("verify-records")) verify_records_by_audit_trail(records);
-  if (app.got_subcommand("import")) import_archive_sessions_as_runs(records);
-  if (app.got_subcommand("export")) export_selected_runs(records);
+  if (app.got_subcommand("verify-records")) verify_records(records);
+  if (app.got_subcommand("import")) import_archive(records);
+  if (app.got_subcommand("export")) export_runs(records);
   if (app.got_subcommand("trend")) print_metric_trend(records);
-  if (app.got_subcommand("capability")) print_process_capability(records);
+  if (app.got_subcommand("capability")) print_capability(records);
   if (app.got_subcommand("study")) print_gauge_study(records);
 }
 
@@ -279,10 +278,9 @@ int main(int argc, char** argv) {
   vlp::add_run_command(app, run);
   vlp::add_verify_command(app, run);
   vlp::add_hook_command(app, run);
-  vlp::add_commands_of_a_run(app, records);
+  vlp::add_run_commands(app, records);
   vlp::add_upkeep_commands(app, records);
   vlp::add_transfer_commands(app, records);
   vlp::add_statistics_commands(app, records);
-  return vlp::parse_arguments_and_run(app, argc, argv,
-                                      [&] { vlp::run_command(app, run, records); });
+  return vlp::parse_and_run(app, argc, argv, [&] { vlp::run_command(app, run, records); });
 }

@@ -28,7 +28,7 @@ struct Options {
   std::vector<std::string> folders;
   std::string lamps, calibration, labels, output;
   bool row_time = false;
-  FrontendOptions frontend = make_default_image_intake_options();
+  FrontendOptions frontend = make_intake_options();
 };
 
 /// Inputs read from the files of the options.
@@ -54,25 +54,24 @@ std::vector<Frame> read_labels(const fs::path& folder, const std::string& table,
 }
 
 Inputs read_inputs(const Options& options) {
-  check_output_is_not_input(options.output, {options.lamps, options.calibration});
+  check_output_is_no_input(options.output, {options.lamps, options.calibration});
   Inputs inputs;
   inputs.lamps = read_lamps_of_room(options.lamps, options.frontend.room);
   if (!options.calibration.empty()) inputs.calibration = read_calibration(options.calibration);
   for (const std::string& folder : options.folders) {
     for (const fs::path& image : list_images(folder))
-      check_output_is_not_input(options.output, {image.string()});
+      check_output_is_no_input(options.output, {image.string()});
     inputs.labels.push_back(read_labels(folder, options.labels, !options.row_time));
   }
   {
     Progress progress("images");
-    inputs.lights = detect_lights_in_folders(
+    inputs.lights = detect_in_folders(
         {options.folders.begin(), options.folders.end()}, inputs.lamps, inputs.calibration,
-        !options.row_time, options.frontend, [&](std::size_t done, std::size_t total) {
-          progress.update_progress_display(done, total);
-        });
+        !options.row_time, options.frontend,
+        [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
   StepResult remarks;
-  add_image_intake_remarks(inputs.lights.observations, remarks);
+  add_intake_remarks(inputs.lights.observations, remarks);
   print_step_remarks(remarks);
   return inputs;
 }
@@ -80,11 +79,11 @@ Inputs read_inputs(const Options& options) {
 void train(const Options& options) {
   const Inputs inputs = read_inputs(options);
   const TrainStepResult result =
-      train_lamp_classifier(inputs.lights, inputs.labels, inputs.lamps, options.folders.front());
+      run_train_step(inputs.lights, inputs.labels, inputs.lamps, options.folders.front());
   print_step_remarks(result);
-  throw_if_step_failed(result);
-  write_lamp_classifier(options.output, result.classifier);
-  print_lamp_classifier_training(result);
+  require_success(result);
+  write_classifier(options.output, result.classifier);
+  print_training(result);
 }
 
 void train_row_time(const CLI::App& app, const Options& options) {
@@ -95,11 +94,11 @@ void train_row_time(const CLI::App& app, const Options& options) {
   const Inputs inputs = read_inputs(options);
   std::vector<std::string> files = options.folders;
   files.push_back(options.lamps);
-  const RowTimeStepResult result = estimate_row_time_from_lights(
-      inputs.lights, inputs.labels, inputs.lamps, options.lamps, inputs.calibration,
-      make_history_entry_from_command_line(app, files));
+  const RowTimeStepResult result =
+      run_row_time_step(inputs.lights, inputs.labels, inputs.lamps, options.lamps,
+                        inputs.calibration, make_command_entry(app, files));
   print_step_remarks(result);
-  throw_if_step_failed(result);
+  require_success(result);
   if (!options.output.empty()) write_calibration(options.output, result.calibration);
   print_row_time(result.row_time, inputs.lights.camera.readout);
 }
@@ -138,9 +137,9 @@ int main(int argc, char** argv) {
                  "File name of the table of lamps in each folder: image, lamp, u_px, v_px "
                  "(default: detections.csv or true_detections.csv; with --row-time none)")
       ->option_text("NAME");
-  vlp::add_readout_direction_option(app, options.frontend.readout);
+  vlp::add_readout(app, options.frontend.readout);
   vlp::add_threads_option(app, options.frontend.threads);
-  return vlp::parse_arguments_and_run(app, argc, argv, [&] {
+  return vlp::parse_and_run(app, argc, argv, [&] {
     if (row_time->count() == 0 && output->count() == 0) throw CLI::RequiredError("--output");
     if (options.row_time) {
       vlp::train_row_time(app, options);

@@ -6,9 +6,9 @@
 
 namespace vlp {
 
-std::optional<MatrixX> estimate_solution_jacobian_wrt_errors(const PerturbedSolve& solve,
-                                                             const Eigen::VectorXd& nominal,
-                                                             const MatrixX& covariance) {
+std::optional<MatrixX> differentiate_solution(const PerturbedSolve& solve,
+                                              const Eigen::VectorXd& nominal,
+                                              const MatrixX& covariance) {
   const Eigen::LLT<Eigen::MatrixXd> factor(covariance);
   if (factor.info() != Eigen::Success) return {};
   const Eigen::MatrixXd lower = factor.matrixL();

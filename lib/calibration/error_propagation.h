@@ -30,8 +30,8 @@ using PerturbedSolve = std::function<std::optional<Eigen::VectorXd>(const Eigen:
 /// coefficients, change together. If a column has no solution, it is tried once more at 1/16 of its
 /// size. Reason: a solve may select other data at a larger error. Noise of the solve is then
 /// amplified 16 times, which is still far below the result.
-std::optional<MatrixX> estimate_solution_jacobian_wrt_errors(const PerturbedSolve& solve,
-                                                             const Eigen::VectorXd& nominal,
-                                                             const MatrixX& covariance);
+std::optional<MatrixX> differentiate_solution(const PerturbedSolve& solve,
+                                              const Eigen::VectorXd& nominal,
+                                              const MatrixX& covariance);
 
 }  // namespace vlp

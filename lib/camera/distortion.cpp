@@ -43,8 +43,7 @@ Distortion::Value Distortion::operator()(const Eigen::Vector2d& z) const {
   return value;
 }
 
-Eigen::Matrix<double, 2, 12> Distortion::distortion_coefficient_jacobian(
-    const Eigen::Vector2d& z) const {
+Eigen::Matrix<double, 2, 12> Distortion::coefficient_jacobian(const Eigen::Vector2d& z) const {
   const double r2 = z.squaredNorm(), r4 = r2 * r2, r6 = r4 * r2, xy2 = 2 * z.x() * z.y();
   const Radial l = compute_radial(k, r2);
   const double d_factor_d_numerator = 1 / l.denominator,
@@ -63,7 +62,7 @@ Eigen::Matrix<double, 2, 12> Distortion::distortion_coefficient_jacobian(
   return jacobian;
 }
 
-double Distortion::compute_max_valid_distortion_radius() const {
+double Distortion::compute_max_radius() const {
   // Rate at which the distorted point moves outwards along a line through the origin in direction
   // u:
   //   L + 2 r2 L' + r u.w,

@@ -28,20 +28,20 @@ struct Distortion {
   Value operator()(const Eigen::Vector2d& z) const;
 
   /// Returns the radial factor L of Distortion at r2 = |z|^2.
-  double radial_distortion_factor(double r2) const {
+  double radial_factor(double r2) const {
     return (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) /
            (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])));
   }
 
   /// Computes the derivative of the distorted point (x', y') of z with respect to the twelve
   /// coefficients, one column each in the order of `k`.
-  Eigen::Matrix<double, 2, 12> distortion_coefficient_jacobian(const Eigen::Vector2d& z) const;
+  Eigen::Matrix<double, 2, 12> coefficient_jacobian(const Eigen::Vector2d& z) const;
 
   /// Computes the radius r = |z| up to which the model is one to one. It is the smallest r at which
   /// the distorted point stops moving outwards in some direction while z moves outwards. Beyond it
   /// two rays share a pixel, and the model describes no lens. Without tangential and prism terms
   /// only r L(r^2) matters. Returns infinity if there is no such radius up to searched_radius.
-  double compute_max_valid_distortion_radius() const;
+  double compute_max_radius() const;
   static constexpr double searched_radius = 10;  // tan 84 degrees
 };
 

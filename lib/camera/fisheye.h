@@ -18,12 +18,12 @@ struct Fisheye {
 
   /// Returns d(a): the distance from the principal point, in focal lengths, of a ray at `angle_rad`
   /// to the optical axis.
-  double fisheye_radius_from_angle(double angle_rad) const {
+  double radius_from_angle(double angle_rad) const {
     const double t = angle_rad * angle_rad;
     return angle_rad * (1 + t * (k[0] + t * (k[1] + t * (k[2] + t * k[3]))));
   }
   /// Returns the derivative of d with respect to the angle, in focal lengths per rad.
-  double fisheye_radius_derivative(double angle_rad) const {
+  double radius_derivative(double angle_rad) const {
     const double t = angle_rad * angle_rad;
     return 1 + t * (3 * k[0] + t * (5 * k[1] + t * (7 * k[2] + t * 9 * k[3])));
   }
@@ -31,16 +31,15 @@ struct Fisheye {
   /// Computes the angle up to which the model is one to one: the smallest angle at which the
   /// distance stops growing, at most pi. Beyond it two rays share a pixel, and the model describes
   /// no lens.
-  double compute_max_valid_fisheye_angle_rad() const;
+  double compute_max_angle_rad() const;
 
   /// Inverts d(a) by Newton's method within a shrinking bracket.
   ///
   /// @param at_distance  distance to invert, in focal lengths, >= 0
-  /// @param valid_rad    compute_max_valid_fisheye_angle_rad()
+  /// @param valid_rad    compute_max_angle_rad()
   /// @param start_rad    initial angle, 0 to valid_rad
   /// @return             angle in [0, valid_rad]; NaN if the distance exceeds that of valid_rad
-  double fisheye_angle_from_radius_rad(double at_distance, double valid_rad,
-                                       double start_rad) const;
+  double angle_from_radius_rad(double at_distance, double valid_rad, double start_rad) const;
 };
 
 /// Inverse of the radial projection of one lens. A table of initial angles reduces Newton's method
@@ -49,16 +48,15 @@ class FisheyeAngles {
  public:
   explicit FisheyeAngles(const Fisheye& fisheye);
 
-  double max_valid_fisheye_angle_rad() const { return valid_rad_; }
+  double max_angle_rad() const { return valid_rad_; }
   /// Returns the angle, rad, of a ray whose image is at `distance` focal lengths from the principal
-  /// point. NaN beyond the valid range (Fisheye::fisheye_angle_from_radius_rad()).
+  /// point. NaN beyond the valid range (Fisheye::angle_from_radius_rad()).
   double operator()(double distance) const {
-    return fisheye_.fisheye_angle_from_radius_rad(distance, valid_rad_,
-                                                  look_up_initial_fisheye_angle_rad(distance));
+    return fisheye_.angle_from_radius_rad(distance, valid_rad_, look_up_angle_rad(distance));
   }
 
  private:
-  double look_up_initial_fisheye_angle_rad(double distance) const;
+  double look_up_angle_rad(double distance) const;
 
   Fisheye fisheye_;
   double valid_rad_;

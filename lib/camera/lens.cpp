@@ -19,7 +19,7 @@ namespace {
 using Matrix23 = Eigen::Matrix<double, 2, 3>;
 
 /// d(x/z, y/z) / d(x, y, z).
-Matrix23 perspective_division_jacobian(const Eigen::Vector2d& z, double inverse_depth) {
+Matrix23 perspective_jacobian(const Eigen::Vector2d& z, double inverse_depth) {
   Matrix23 jacobian;
   jacobian << inverse_depth, 0, -z.x() * inverse_depth, 0, inverse_depth, -z.y() * inverse_depth;
   return jacobian;
@@ -31,25 +31,23 @@ class Opencv : public LensFamily {
   explicit Opencv(std::span<const double> distortions)
       : distortions_(static_cast<Eigen::Index>(distortions.size())) {
     std::copy(distortions.begin(), distortions.end(), distortion_.k.begin());
-    const double radius = distortion_.compute_max_valid_distortion_radius();
+    const double radius = distortion_.compute_max_radius();
     valid_radius_squared_ = radius * radius;
   }
-  std::optional<Eigen::Vector2d> project_to_normalized_image_plane(
-      const Eigen::Vector3d& x) const override {
+  std::optional<Eigen::Vector2d> project_to_plane(const Eigen::Vector3d& x) const override {
     const Eigen::Vector2d z = x.head<2>() / x.z();
     if (!(x.z() > 0) || !(z.squaredNorm() <= valid_radius_squared_)) return std::nullopt;
     return distortion_(z).distorted;
   }
-  Jacobians compute_projection_jacobians(const Eigen::Vector3d& x) const override {
+  Jacobians compute_jacobians(const Eigen::Vector3d& x) const override {
     const double inverse_depth = 1 / x.z();
     const Eigen::Vector2d z = x.head<2>() * inverse_depth;
-    return {distortion_(z).d_distorted_d_z * perspective_division_jacobian(z, inverse_depth),
-            distortion_.distortion_coefficient_jacobian(z).leftCols(distortions_)};
+    return {distortion_(z).d_distorted_d_z * perspective_jacobian(z, inverse_depth),
+            distortion_.coefficient_jacobian(z).leftCols(distortions_)};
   }
-  std::optional<Ray> unproject_normalized_image_position(
-      const Eigen::Vector2d& plane) const override {
+  std::optional<Ray> unproject_from_plane(const Eigen::Vector2d& plane) const override {
     Eigen::Matrix2d d_plane_d_z;
-    const auto z = undistort_point_newton(plane, d_plane_d_z);
+    const auto z = undistort_newton(plane, d_plane_d_z);
     if (!z) return std::nullopt;
     Ray ray;
     ray.direction << *z, 1;
@@ -58,23 +56,23 @@ class Opencv : public LensFamily {
   }
 
  private:
-  std::optional<Eigen::Vector2d> undistort_point_newton(const Eigen::Vector2d& distorted,
-                                                        Eigen::Matrix2d& d_distorted_d_z) const;
+  std::optional<Eigen::Vector2d> undistort_newton(const Eigen::Vector2d& distorted,
+                                                  Eigen::Matrix2d& d_distorted_d_z) const;
 
   Eigen::Index distortions_;
   Distortion distortion_;
   double valid_radius_squared_;
 };
 
-std::optional<Eigen::Vector2d> Opencv::undistort_point_newton(
-    const Eigen::Vector2d& distorted, Eigen::Matrix2d& d_distorted_d_z) const {
+std::optional<Eigen::Vector2d> Opencv::undistort_newton(const Eigen::Vector2d& distorted,
+                                                        Eigen::Matrix2d& d_distorted_d_z) const {
   constexpr double searched_radius_squared =
       Distortion::searched_radius * Distortion::searched_radius;
   const double reach_squared = std::min(valid_radius_squared_, searched_radius_squared);
   const double squared_norm = distorted.squaredNorm();
   // An initial point without the radial distortion at the distorted point saves a step. It is used
   // if it lies within the valid radius.
-  Eigen::Vector2d z = distorted / distortion_.radial_distortion_factor(squared_norm);
+  Eigen::Vector2d z = distorted / distortion_.radial_factor(squared_norm);
   if (squared_norm > reach_squared) {
     z = distorted * (0.9 * std::sqrt(reach_squared / squared_norm));
   } else if (!(z.squaredNorm() <= reach_squared)) {
@@ -114,7 +112,7 @@ std::optional<Eigen::Vector2d> Opencv::undistort_point_newton(
 struct StereographicPoint {
   explicit StereographicPoint(const Eigen::Vector3d& x)
       : norm(x.norm()), depth(norm + x.z()), plane(x.head<2>() * (2 / depth)) {}
-  Matrix23 compute_projection_jacobian(const Eigen::Vector3d& x) const {
+  Matrix23 compute_jacobian(const Eigen::Vector3d& x) const {
     const Eigen::Vector3d d_depth = x / norm + Eigen::Vector3d::UnitZ();
     return 2 / depth * (Matrix23::Identity() - plane / 2 * d_depth.transpose());
   }
@@ -125,17 +123,15 @@ struct StereographicPoint {
 
 class Stereographic : public LensFamily {
  public:
-  std::optional<Eigen::Vector2d> project_to_normalized_image_plane(
-      const Eigen::Vector3d& x) const override {
+  std::optional<Eigen::Vector2d> project_to_plane(const Eigen::Vector3d& x) const override {
     const StereographicPoint at(x);
     if (!(at.depth > 0)) return std::nullopt;
     return at.plane;
   }
-  Jacobians compute_projection_jacobians(const Eigen::Vector3d& x) const override {
-    return {StereographicPoint(x).compute_projection_jacobian(x), {}};
+  Jacobians compute_jacobians(const Eigen::Vector3d& x) const override {
+    return {StereographicPoint(x).compute_jacobian(x), {}};
   }
-  std::optional<Ray> unproject_normalized_image_position(
-      const Eigen::Vector2d& plane) const override {
+  std::optional<Ray> unproject_from_plane(const Eigen::Vector2d& plane) const override {
     Ray ray;
     ray.direction << plane, 1 - plane.squaredNorm() / 4;
     if (!ray.direction.allFinite()) return std::nullopt;
@@ -149,19 +145,18 @@ class Splined : public LensFamily {
   Splined(const SplineGrid& grid, std::span<const double> control_points)
       : surface_(grid, control_points) {}
 
-  std::optional<Eigen::Vector2d> project_to_normalized_image_plane(
-      const Eigen::Vector3d& x) const override {
+  std::optional<Eigen::Vector2d> project_to_plane(const Eigen::Vector3d& x) const override {
     const StereographicPoint at(x);
-    if (!(at.depth > 0) || !surface_.is_spline_defined_at(at.plane)) return std::nullopt;
+    if (!(at.depth > 0) || !surface_.is_defined_at(at.plane)) return std::nullopt;
     return surface_.distort_point(at.plane);
   }
-  Jacobians compute_projection_jacobians(const Eigen::Vector3d& x) const override {
+  Jacobians compute_jacobians(const Eigen::Vector3d& x) const override {
     const StereographicPoint at(x);
-    return {surface_(at.plane).d_distorted_d_u * at.compute_projection_jacobian(x), {}};
+    return {surface_(at.plane).d_distorted_d_u * at.compute_jacobian(x), {}};
   }
-  std::vector<DistortionDerivative> compute_projection_derivatives_wrt_distortions(
+  std::vector<DistortionDerivative> differentiate_distortions(
       const Eigen::Vector3d& x) const override {
-    const SplineSurface::Weights at = surface_.control_point_weights(StereographicPoint(x).plane);
+    const SplineSurface::Weights at = surface_.look_up_weights(StereographicPoint(x).plane);
     const SplineGrid& grid = surface_.spline_grid();
     const auto width = static_cast<std::size_t>(grid.order) + 1;
     std::vector<DistortionDerivative> derivatives;
@@ -175,8 +170,7 @@ class Splined : public LensFamily {
     }
     return derivatives;
   }
-  std::optional<Ray> unproject_normalized_image_position(
-      const Eigen::Vector2d& plane) const override {
+  std::optional<Ray> unproject_from_plane(const Eigen::Vector2d& plane) const override {
     Eigen::Matrix2d d_plane_d_u;
     const auto u = surface_.undistort_point(plane, d_plane_d_u);
     if (!u) return std::nullopt;
@@ -195,20 +189,17 @@ class OpencvFisheye : public LensFamily {
  public:
   explicit OpencvFisheye(std::span<const double> k)
       : fisheye_{{k[0], k[1], k[2], k[3]}}, angles_(fisheye_) {}
-  std::optional<Eigen::Vector2d> project_to_normalized_image_plane(
-      const Eigen::Vector3d& x) const override {
+  std::optional<Eigen::Vector2d> project_to_plane(const Eigen::Vector3d& x) const override {
     const double axis_distance = x.head<2>().norm();
     const double angle_rad = std::atan2(axis_distance, x.z());
-    if (!x.allFinite() || !(angle_rad <= angles_.max_valid_fisheye_angle_rad()) ||
+    if (!x.allFinite() || !(angle_rad <= angles_.max_angle_rad()) ||
         !(axis_distance > 0 || x.z() > 0)) {
       return std::nullopt;
     }
-    return x.head<2>() *
-           (fisheye_.fisheye_radius_from_angle(angle_rad) / std::max(axis_distance, kOnAxis));
+    return x.head<2>() * (fisheye_.radius_from_angle(angle_rad) / std::max(axis_distance, kOnAxis));
   }
-  Jacobians compute_projection_jacobians(const Eigen::Vector3d& x) const override;
-  std::optional<Ray> unproject_normalized_image_position(
-      const Eigen::Vector2d& plane) const override;
+  Jacobians compute_jacobians(const Eigen::Vector3d& x) const override;
+  std::optional<Ray> unproject_from_plane(const Eigen::Vector2d& plane) const override;
 
  private:
   /// Distance from the axis below which the direction away from it is not defined.
@@ -218,14 +209,13 @@ class OpencvFisheye : public LensFamily {
   FisheyeAngles angles_;
 };
 
-LensFamily::Jacobians OpencvFisheye::compute_projection_jacobians(const Eigen::Vector3d& x) const {
+LensFamily::Jacobians OpencvFisheye::compute_jacobians(const Eigen::Vector3d& x) const {
   const Eigen::Vector2d xy = x.head<2>();
   const double axis_distance = xy.norm(), squared_norm = x.squaredNorm();
   const double angle_rad = std::atan2(axis_distance, x.z());
-  const double slope = fisheye_.fisheye_radius_derivative(angle_rad);
+  const double slope = fisheye_.radius_derivative(angle_rad);
   const bool on_axis = axis_distance <= kOnAxis;
-  const double scale =
-      on_axis ? 1 / x.z() : fisheye_.fisheye_radius_from_angle(angle_rad) / axis_distance;
+  const double scale = on_axis ? 1 / x.z() : fisheye_.radius_from_angle(angle_rad) / axis_distance;
   const Eigen::Vector2d radial_direction =
       on_axis ? Eigen::Vector2d(0, 0) : Eigen::Vector2d(xy / axis_distance);
   Jacobians result;
@@ -242,7 +232,7 @@ LensFamily::Jacobians OpencvFisheye::compute_projection_jacobians(const Eigen::V
   return result;
 }
 
-std::optional<LensFamily::Ray> OpencvFisheye::unproject_normalized_image_position(
+std::optional<LensFamily::Ray> OpencvFisheye::unproject_from_plane(
     const Eigen::Vector2d& plane) const {
   const double distance = plane.norm();
   const double angle_rad = angles_(distance);
@@ -251,7 +241,7 @@ std::optional<LensFamily::Ray> OpencvFisheye::unproject_normalized_image_positio
   const bool on_axis = distance <= kOnAxis;
   const double inverse = on_axis ? 0 : 1 / distance, across = on_axis ? 1 : sine * inverse;
   const double x = plane.x() * inverse, y = plane.y() * inverse;
-  const double by_slope = 1 / fisheye_.fisheye_radius_derivative(angle_rad),
+  const double by_slope = 1 / fisheye_.radius_derivative(angle_rad),
                more = cosine * by_slope - across;
   std::optional<Ray> ray(std::in_place);
   ray->direction << across * plane, cosine;
@@ -264,7 +254,7 @@ std::optional<LensFamily::Ray> OpencvFisheye::unproject_normalized_image_positio
 std::shared_ptr<const LensFamily> make_lens_family(LensModel model,
                                                    std::span<const double> distortions) {
   if (is_splined_lens_model(model))
-    return std::make_shared<Splined>(spline_grid_of_lens_model(model), distortions);
+    return std::make_shared<Splined>(spline_grid_of(model), distortions);
   switch (model) {
     case LensModel::stereographic:
       return std::make_shared<Stereographic>();
@@ -298,19 +288,19 @@ Lens::Lens(LensModel model, std::span<const double> parameters) : model_(model) 
 }
 
 std::optional<Eigen::Vector2d> Lens::project_point(const Eigen::Vector3d& x_in_camera) const {
-  const auto plane = family_->project_to_normalized_image_plane(x_in_camera);
+  const auto plane = family_->project_to_plane(x_in_camera);
   if (!plane) return std::nullopt;
   Eigen::Vector2d pixel = focal_px_.cwiseProduct(*plane) + center_px_;
   if (!pixel.allFinite()) return std::nullopt;
   return pixel;
 }
 
-std::optional<Lens::Projection> Lens::project_point_with_jacobians(
+std::optional<Lens::Projection> Lens::project_with_jacobians(
     const Eigen::Vector3d& x_in_camera) const {
   const auto pixel = project_point(x_in_camera);
   if (!pixel) return std::nullopt;
   constexpr Eigen::Index core = 4;
-  const LensFamily::Jacobians family_jacobians = family_->compute_projection_jacobians(x_in_camera);
+  const LensFamily::Jacobians family_jacobians = family_->compute_jacobians(x_in_camera);
   const Eigen::Index distortions = family_jacobians.d_plane_d_distortions.cols();
   Projection result{*pixel, focal_px_.asDiagonal() * family_jacobians.d_plane_d_point, {}};
   result.d_pixel_d_parameters.resize(2, core + distortions);
@@ -322,13 +312,13 @@ std::optional<Lens::Projection> Lens::project_point_with_jacobians(
   return result;
 }
 
-std::optional<Lens::SparseJacobian> Lens::compute_pixel_jacobian_wrt_intrinsics(
+std::optional<Lens::SparseJacobian> Lens::differentiate_intrinsics(
     const Eigen::Vector3d& x_in_camera) const {
-  const auto projection = project_point_with_jacobians(x_in_camera);
+  const auto projection = project_with_jacobians(x_in_camera);
   if (!projection) return std::nullopt;
   constexpr Eigen::Index core = 4;
   const auto& dense = projection->d_pixel_d_parameters;
-  const auto sparse = family_->compute_projection_derivatives_wrt_distortions(x_in_camera);
+  const auto sparse = family_->differentiate_distortions(x_in_camera);
   SparseJacobian result{{}, Eigen::Matrix2Xd::Zero(2, dense.cols() + std::ssize(sparse))};
   result.d_pixel.leftCols(dense.cols()) = dense;
   for (Eigen::Index i = 0; i < dense.cols(); ++i) result.parameters.push_back(i);
@@ -342,7 +332,7 @@ std::optional<Lens::SparseJacobian> Lens::compute_pixel_jacobian_wrt_intrinsics(
 std::optional<Lens::Ray> Lens::unproject_pixel(const Eigen::Vector2d& pixel) const {
   const Eigen::Vector2d plane = (pixel - center_px_).cwiseQuotient(focal_px_);
   if (!plane.allFinite()) return std::nullopt;
-  const auto ray = family_->unproject_normalized_image_position(plane);
+  const auto ray = family_->unproject_from_plane(plane);
   if (!ray) return std::nullopt;
   return Ray{ray->direction, ray->d_direction_d_plane * focal_px_.cwiseInverse().asDiagonal()};
 }

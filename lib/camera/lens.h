@@ -40,8 +40,8 @@ class Lens {
   ///   PINHOLE, OPENCVn  at or behind the plane z = 0
   ///   other models      straight behind the camera
   ///   OPENCVn, OPENCV_FISHEYE, splined
-  ///                     beyond Distortion::compute_max_valid_distortion_radius(),
-  ///                     Fisheye::max_valid_fisheye_angle_rad() or
+  ///                     beyond Distortion::compute_max_radius(),
+  ///                     Fisheye::max_angle_rad() or
   ///                     SplineSurface::spline_half_extent()
   std::optional<Eigen::Vector2d> project_point(const Eigen::Vector3d& x_in_camera) const;
 
@@ -53,7 +53,7 @@ class Lens {
     Eigen::Matrix<double, 2, Eigen::Dynamic, Eigen::DontAlign, 2, 16> d_pixel_d_parameters;
   };
   /// Projects a point as project_point() does and computes both Jacobians. Does not allocate.
-  std::optional<Projection> project_point_with_jacobians(const Eigen::Vector3d& x_in_camera) const;
+  std::optional<Projection> project_with_jacobians(const Eigen::Vector3d& x_in_camera) const;
 
   /// Sparse Jacobian of a pixel with respect to the parameters of the lens.
   struct SparseJacobian {
@@ -64,8 +64,7 @@ class Lens {
   };
   /// Computes the Jacobian of a point's pixel with respect to all parameters, including the control
   /// points of splined lenses. Returns std::nullopt for points that project_point() rejects.
-  std::optional<SparseJacobian> compute_pixel_jacobian_wrt_intrinsics(
-      const Eigen::Vector3d& x_in_camera) const;
+  std::optional<SparseJacobian> differentiate_intrinsics(const Eigen::Vector3d& x_in_camera) const;
 
   struct Ray {
     /// Direction, not of unit length: z = 1 for PINHOLE and OPENCVn; z <= 1 for other models, where

@@ -17,7 +17,7 @@ std::string_view make_splined_name(LensModel model) {
   static std::map<LensModel, std::string> names;
   const std::lock_guard alone(mutex);
   const auto [entry, added] = names.try_emplace(model);
-  if (added) entry->second = splined_lens_model_name(spline_grid_of_lens_model(model));
+  if (added) entry->second = splined_lens_name(spline_grid_of(model));
   return entry->second;
 }
 
@@ -32,7 +32,7 @@ std::optional<LensModel> lens_model_from_name(std::string_view name) {
   for (const LensModelRow& row : list_lens_models()) {
     if (row.name == name) return row.model;
   }
-  if (const auto grid = parse_spline_grid(name)) return lens_model_for_spline_grid(*grid);
+  if (const auto grid = parse_spline_grid(name)) return splined_lens_model(*grid);
   return std::nullopt;
 }
 
@@ -44,9 +44,8 @@ std::string list_lens_model_names() {
 
 std::size_t num_lens_parameters(LensModel model) {
   constexpr std::size_t core = 4;
-  return core + (is_splined_lens_model(model)
-                     ? 2 * spline_grid_of_lens_model(model).num_control_points()
-                     : list_distortion_names_and_initial_values(model).size());
+  return core + (is_splined_lens_model(model) ? 2 * spline_grid_of(model).num_control_points()
+                                              : list_distortions(model).size());
 }
 
 }  // namespace vlp

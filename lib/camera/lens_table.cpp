@@ -41,7 +41,7 @@ static_assert(kModels.size() == static_cast<std::size_t>(LensModel::fisheye) + 1
 
 std::span<const LensModelRow> list_lens_models() { return kModels; }
 
-std::span<const LensDistortion> list_distortion_names_and_initial_values(LensModel model) {
+std::span<const LensDistortion> list_distortions(LensModel model) {
   if (is_splined_lens_model(model)) return {};
   return kModels[static_cast<std::size_t>(model)].distortions;
 }

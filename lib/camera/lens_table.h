@@ -29,6 +29,6 @@ std::span<const LensModelRow> list_lens_models();
 
 /// Returns the distortions of a model. Empty for a splined lens: its control points have no names
 /// and their initial value is 0.
-std::span<const LensDistortion> list_distortion_names_and_initial_values(LensModel model);
+std::span<const LensDistortion> list_distortions(LensModel model);
 
 }  // namespace vlp

@@ -33,10 +33,10 @@ std::optional<SplineGrid> parse_spline_grid(std::string_view name) {
                         is_valid_count(grid.ny) && grid.fov_x_deg >= 1 &&
                         grid.fov_x_deg <= SplineGrid::kMaxFov_deg;
   // A model has exactly one name: no leading zeros.
-  return is_valid && splined_lens_model_name(grid) == name ? std::optional(grid) : std::nullopt;
+  return is_valid && splined_lens_name(grid) == name ? std::optional(grid) : std::nullopt;
 }
 
-std::string splined_lens_model_name(const SplineGrid& grid) {
+std::string splined_lens_name(const SplineGrid& grid) {
   std::string name;
   const std::array numbers{grid.order, grid.nx, grid.ny, grid.fov_x_deg};
   for (std::size_t i = 0; i < kWords.size(); ++i) {

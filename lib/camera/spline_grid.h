@@ -32,7 +32,7 @@ struct SplineGrid {
 /// Returns the LensModel of the splined lens with this grid. Its value holds the four numbers of
 /// the grid in separate bits, above the enumerators of LensModel.
 /// @pre The numbers are within the bounds of SplineGrid.
-constexpr LensModel lens_model_for_spline_grid(const SplineGrid& grid) {
+constexpr LensModel splined_lens_model(const SplineGrid& grid) {
   return static_cast<LensModel>(1 << 30 | (grid.order - 2) << 29 | grid.fov_x_deg << 20 |
                                 grid.nx << 10 | grid.ny);
 }
@@ -41,7 +41,7 @@ constexpr bool is_splined_lens_model(LensModel model) { return static_cast<int>(
 
 /// Returns the grid that is stored in the value of a splined lens model.
 /// @pre is_splined_lens_model(model)
-constexpr SplineGrid spline_grid_of_lens_model(LensModel model) {
+constexpr SplineGrid spline_grid_of(LensModel model) {
   const int bits = static_cast<int>(model);
   return {2 + (bits >> 29 & 1), bits >> 10 & 1023, bits & 1023, bits >> 20 & 511};
 }
@@ -50,6 +50,6 @@ constexpr SplineGrid spline_grid_of_lens_model(LensModel model) {
 /// name differently, or if a number is out of the bounds of SplineGrid.
 std::optional<SplineGrid> parse_spline_grid(std::string_view name);
 /// Returns mrcal's name of the splined lens with this grid.
-std::string splined_lens_model_name(const SplineGrid& grid);
+std::string splined_lens_name(const SplineGrid& grid);
 
 }  // namespace vlp

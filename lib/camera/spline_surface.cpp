@@ -41,7 +41,7 @@ struct Piece {
 
 /// Returns the piece at a position, which counts in control points from the first one.
 template <int Order>
-Piece find_spline_piece(double at, int control_points) {
+Piece locate_spline_piece(double at, int control_points) {
   constexpr double middle = Order == 2 ? 0.5 : 0;
   const int interval = std::clamp(static_cast<int>(at + middle), 1, control_points - Order);
   return {interval - 1, at - interval};
@@ -55,15 +55,15 @@ SplineSurface::SplineSurface(const SplineGrid& grid, std::span<const double> con
   pieces_per_u_ = (grid.nx - grid.order) / (2 * edge);
   reach_ = {edge, (grid.ny - grid.order) / (2 * pieces_per_u_)};
   if (grid.order == 2) {
-    fill_spline_polynomial_pieces<2>(control_points);
+    fill_pieces<2>(control_points);
   } else {
-    fill_spline_polynomial_pieces<3>(control_points);
+    fill_pieces<3>(control_points);
   }
-  fill_initial_undistorted_point_table();
+  fill_guesses();
 }
 
 template <int Order>
-void SplineSurface::fill_spline_polynomial_pieces(std::span<const double> control_points) {
+void SplineSurface::fill_pieces(std::span<const double> control_points) {
   constexpr int width = Order + 1;
   const Eigen::Matrix<double, width, width> by_power = compute_spline_basis<Order>().transpose();
   Eigen::Matrix<double, width, width> x, y;
@@ -89,9 +89,9 @@ template <int Order>
 SplineSurface::Value SplineSurface::evaluate_spline(const Eigen::Vector2d& u) const {
   constexpr int width = Order + 1;
   const auto [column, x] =
-      find_spline_piece<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx);
+      locate_spline_piece<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx);
   const auto [row, y] =
-      find_spline_piece<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
+      locate_spline_piece<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
   const Eigen::Vector2d* powers = pieces_.data() + static_cast<std::ptrdiff_t>(width * width) *
                                                        (row * (grid_.nx - Order) + column);
   Eigen::Vector2d shift(0, 0), by_x(0, 0), by_y(0, 0);
@@ -118,10 +118,11 @@ SplineSurface::Value SplineSurface::operator()(const Eigen::Vector2d& u) const {
 }
 
 template <int Order>
-SplineSurface::Weights SplineSurface::compute_control_point_weights(
-    const Eigen::Vector2d& u) const {
-  const Piece x = find_spline_piece<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0, grid_.nx),
-              y = find_spline_piece<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0, grid_.ny);
+SplineSurface::Weights SplineSurface::compute_weights(const Eigen::Vector2d& u) const {
+  const Piece x = locate_spline_piece<Order>(u.x() * pieces_per_u_ + (grid_.nx - 1) / 2.0,
+                                             grid_.nx),
+              y = locate_spline_piece<Order>(u.y() * pieces_per_u_ + (grid_.ny - 1) / 2.0,
+                                             grid_.ny);
   Weights weights{x.index, y.index, {}, {}};
   const auto rows = compute_spline_basis<Order>();
   double power_x = 1, power_y = 1;
@@ -134,13 +135,12 @@ SplineSurface::Weights SplineSurface::compute_control_point_weights(
   return weights;
 }
 
-SplineSurface::Weights SplineSurface::control_point_weights(const Eigen::Vector2d& u) const {
-  return grid_.order == 2 ? compute_control_point_weights<2>(u)
-                          : compute_control_point_weights<3>(u);
+SplineSurface::Weights SplineSurface::look_up_weights(const Eigen::Vector2d& u) const {
+  return grid_.order == 2 ? compute_weights<2>(u) : compute_weights<3>(u);
 }
 
 template <int Order>
-std::optional<Eigen::Vector2d> SplineSurface::search_undistorted_point(
+std::optional<Eigen::Vector2d> SplineSurface::search_undistorted(
     Eigen::Vector2d u, const Eigen::Vector2d& distorted, Eigen::Matrix2d& d_distorted_d_u) const {
   constexpr int max_iterations = 50, max_halvings = 12;
   constexpr double numeric_tolerance = 1e-12;  // relative to the reach, for pixels at its very end
@@ -153,7 +153,7 @@ std::optional<Eigen::Vector2d> SplineSurface::search_undistorted_point(
     if (!(error.squaredNorm() < smallest)) {  // halve the step until the error decreases
       if (++halvings == max_halvings) return std::nullopt;
       step /= 2;
-      u = clamp_to_spline_half_extent(from + step);
+      u = clamp_to_extent(from + step);
       continue;
     }
     const Eigen::Matrix2d& j = at.d_distorted_d_u;
@@ -169,23 +169,22 @@ std::optional<Eigen::Vector2d> SplineSurface::search_undistorted_point(
         return std::nullopt;
       }
       d_distorted_d_u = j;
-      return clamp_to_spline_half_extent(u);
+      return clamp_to_extent(u);
     }
     from = u, smallest = error.squaredNorm(), halvings = 0, ++iterations;
-    u = clamp_to_spline_half_extent(from + step);
+    u = clamp_to_extent(from + step);
   }
   return std::nullopt;
 }
 
 std::optional<Eigen::Vector2d> SplineSurface::undistort_point(
     const Eigen::Vector2d& distorted, Eigen::Matrix2d& d_distorted_d_u) const {
-  const Eigen::Vector2d start = compute_initial_undistorted_point(distorted);
-  return grid_.order == 2 ? search_undistorted_point<2>(start, distorted, d_distorted_d_u)
-                          : search_undistorted_point<3>(start, distorted, d_distorted_d_u);
+  const Eigen::Vector2d start = guess_undistorted(distorted);
+  return grid_.order == 2 ? search_undistorted<2>(start, distorted, d_distorted_d_u)
+                          : search_undistorted<3>(start, distorted, d_distorted_d_u);
 }
 
-Eigen::Vector2d SplineSurface::compute_initial_undistorted_point(
-    const Eigen::Vector2d& distorted) const {
+Eigen::Vector2d SplineSurface::guess_undistorted(const Eigen::Vector2d& distorted) const {
   const Eigen::Vector2d at = (distorted - first_node_).cwiseProduct(nodes_per_unit_);
   const auto clamp_node = [](double node) { return node > 0 ? std::min(node, kNodes - 1.0) : 0; };
   const double column = clamp_node(at.x()), row = clamp_node(at.y());
@@ -194,11 +193,11 @@ Eigen::Vector2d SplineSurface::compute_initial_undistorted_point(
   const double x = column - i, y = row - j;
   const Eigen::Vector2d* node =
       initial_points_.data() + static_cast<std::ptrdiff_t>(j) * kNodes + i;
-  return clamp_to_spline_half_extent((1 - y) * ((1 - x) * node[0] + x * node[1]) +
-                                     y * ((1 - x) * node[kNodes] + x * node[kNodes + 1]));
+  return clamp_to_extent((1 - y) * ((1 - x) * node[0] + x * node[1]) +
+                         y * ((1 - x) * node[kNodes] + x * node[kNodes + 1]));
 }
 
-void SplineSurface::fill_initial_undistorted_point_table() {
+void SplineSurface::fill_guesses() {
   constexpr int num_samples = 2 * kNodes - 1;
   constexpr double inf = std::numeric_limits<double>::infinity();
   std::vector<std::pair<Eigen::Vector2d, Value>> places;
@@ -229,7 +228,7 @@ void SplineSurface::fill_initial_undistorted_point_table() {
     const double distance = (node - whole).squaredNorm();
     if (!(distance < distances[index])) continue;
     distances[index] = distance;
-    initial_points_[index] = clamp_to_spline_half_extent(start);
+    initial_points_[index] = clamp_to_extent(start);
   }
   // Nodes without a sample take the initial point of a neighbor: right and down, then left and up.
   const auto copy_from = [&](std::size_t to, std::size_t from) {

@@ -34,7 +34,7 @@ class SplineSurface {
   /// Half extent of the surface along x and y. Beyond it the lens is not defined.
   const Eigen::Vector2d& spline_half_extent() const { return reach_; }
   /// Returns true if the surface is defined at `u`.
-  bool is_spline_defined_at(const Eigen::Vector2d& u) const {
+  bool is_defined_at(const Eigen::Vector2d& u) const {
     return std::abs(u.x()) <= reach_.x() && std::abs(u.y()) <= reach_.y();
   }
 
@@ -44,7 +44,7 @@ class SplineSurface {
   };
   /// Computes the distorted point of u, in the stereographic plane, and its derivative with respect
   /// to u.
-  /// @pre is_spline_defined_at(u), also for distort_point() and control_point_weights()
+  /// @pre is_defined_at(u), also for distort_point() and look_up_weights()
   Value operator()(const Eigen::Vector2d& u) const;
   Eigen::Vector2d distort_point(const Eigen::Vector2d& u) const { return (*this)(u).distorted; }
 
@@ -54,7 +54,7 @@ class SplineSurface {
     int column, row;
     std::array<double, 4> x, y;
   };
-  Weights control_point_weights(const Eigen::Vector2d& u) const;
+  Weights look_up_weights(const Eigen::Vector2d& u) const;
 
   /// Computes the point u with this distorted position by Newton's method, from an initial point in
   /// a table of fixed size. Returns std::nullopt if no such point within spline_half_extent() is
@@ -64,20 +64,20 @@ class SplineSurface {
 
  private:
   template <int Order>
-  void fill_spline_polynomial_pieces(std::span<const double> control_points);
+  void fill_pieces(std::span<const double> control_points);
   template <int Order>
-  Weights compute_control_point_weights(const Eigen::Vector2d& u) const;
+  Weights compute_weights(const Eigen::Vector2d& u) const;
   template <int Order>
   inline Value evaluate_spline(const Eigen::Vector2d& u) const;
   template <int Order>
-  std::optional<Eigen::Vector2d> search_undistorted_point(Eigen::Vector2d u,
-                                                          const Eigen::Vector2d& distorted,
-                                                          Eigen::Matrix2d& d_distorted_d_u) const;
-  Eigen::Vector2d clamp_to_spline_half_extent(const Eigen::Vector2d& u) const {
+  std::optional<Eigen::Vector2d> search_undistorted(Eigen::Vector2d u,
+                                                    const Eigen::Vector2d& distorted,
+                                                    Eigen::Matrix2d& d_distorted_d_u) const;
+  Eigen::Vector2d clamp_to_extent(const Eigen::Vector2d& u) const {
     return u.cwiseMax(-reach_).cwiseMin(reach_);
   }
-  void fill_initial_undistorted_point_table();
-  Eigen::Vector2d compute_initial_undistorted_point(const Eigen::Vector2d& distorted) const;
+  void fill_guesses();
+  Eigen::Vector2d guess_undistorted(const Eigen::Vector2d& distorted) const;
 
   SplineGrid grid_;
   double pieces_per_u_;

@@ -17,13 +17,12 @@ struct Pair {
   Pair(const CsvTable& csv, std::string_view name, std::string_view other)
       : first_name(name),
         second_name(other),
-        first(csv.get_optional_column(name)),
-        second(csv.get_optional_column(other)) {}
+        first(csv.find_column(name)),
+        second(csv.find_column(other)) {}
 
   std::optional<Eigen::Vector2d> read(const CsvTable& csv, std::size_t row,
                                       CsvTable::Column image) const {
-    const auto a = csv.get_optional_cell_number(row, first),
-               b = csv.get_optional_cell_number(row, second);
+    const auto a = csv.get_optional_number(row, first), b = csv.get_optional_number(row, second);
     if (a.has_value() != b.has_value()) {
       std::string problem("has one of ");
       problem.append(first_name).append(" and ").append(second_name);
@@ -38,23 +37,22 @@ struct Pair {
 
 CapturesTable read_captures_csv(const std::filesystem::path& file) {
   const CsvTable csv(file);
-  const auto image = csv.get_required_column("image");
-  const auto place = csv.get_optional_column("reference_point"),
-             place_sd = csv.get_optional_column("position_sd_m"),
-             spot = csv.get_optional_column("pivot");
+  const auto image = csv.require_column("image");
+  const auto place = csv.find_column("reference_point"),
+             place_sd = csv.find_column("position_sd_m"), spot = csv.find_column("pivot");
   const Pair lean(csv, "roll_rad", "pitch_rad"), velocity(csv, "vx_m_per_s", "vy_m_per_s");
-  const auto velocity_sd = csv.get_optional_column("velocity_sd_m_per_s");
+  const auto velocity_sd = csv.find_column("velocity_sd_m_per_s");
   CapturesTable table;
   for (std::size_t row = 0; row < csv.num_rows(); ++row) {
     const auto field = [&](std::optional<CsvTable::Column> column) {
-      return csv.get_optional_cell_number(row, column);
+      return csv.get_optional_number(row, column);
     };
     Capture capture;
-    capture.time_s = field(csv.get_optional_column("time_s"));
-    capture.x_m = field(csv.get_optional_column("x_m"));
-    capture.y_m = field(csv.get_optional_column("y_m"));
-    capture.z_m = field(csv.get_optional_column("z_m"));
-    capture.yaw_rad = field(csv.get_optional_column("yaw_rad"));
+    capture.time_s = field(csv.find_column("time_s"));
+    capture.x_m = field(csv.find_column("x_m"));
+    capture.y_m = field(csv.find_column("y_m"));
+    capture.z_m = field(csv.find_column("z_m"));
+    capture.yaw_rad = field(csv.find_column("yaw_rad"));
     if (place && !csv.get_cell_text(row, *place).empty()) {
       const std::string_view whose = csv.get_cell_text(row, *place);
       if (whose != "camera" && whose != "axis") {
@@ -72,7 +70,7 @@ CapturesTable read_captures_csv(const std::filesystem::path& file) {
       capture.inclination = Inclination{angles->x(), angles->y()};
     }
     capture.velocity_m_per_s = velocity.read(csv, row, image);
-    capture.yaw_rate_rad_per_s = field(csv.get_optional_column("yaw_rate_rad_per_s"));
+    capture.yaw_rate_rad_per_s = field(csv.find_column("yaw_rate_rad_per_s"));
     capture.velocity_sd_m_per_s = field(velocity_sd);
     if (capture.velocity_sd_m_per_s) {
       if (*capture.velocity_sd_m_per_s < 0) {
@@ -92,7 +90,7 @@ CapturesTable read_captures_csv(const std::filesystem::path& file) {
   return table;
 }
 
-CapturesTable read_captures_csv_of_folder(const std::filesystem::path& folder) {
+CapturesTable read_folder_captures(const std::filesystem::path& folder) {
   const auto file = folder / "captures.csv";
   return std::filesystem::exists(file) ? read_captures_csv(file) : CapturesTable{};
 }

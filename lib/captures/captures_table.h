@@ -50,7 +50,7 @@ using CapturesTable = std::map<std::string, Capture>;
 CapturesTable read_captures_csv(const std::filesystem::path& file);
 
 /// Reads the captures.csv of a folder; returns an empty table if there is none. Throws InputError.
-CapturesTable read_captures_csv_of_folder(const std::filesystem::path& folder);
+CapturesTable read_folder_captures(const std::filesystem::path& folder);
 
 /// Writes a `captures.csv` with the time of each image. Throws InputError if it cannot be written.
 void write_capture_times(const std::filesystem::path& file,

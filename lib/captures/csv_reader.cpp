@@ -58,7 +58,7 @@ struct CsvParsing {
 
   void add_field(std::string_view text) {
     if (row_fields++ == 0) row_line = line;
-    if (text.starts_with('\'') && begins_like_spreadsheet_formula(text)) text.remove_prefix(1);
+    if (text.starts_with('\'') && is_like_formula(text)) text.remove_prefix(1);
     if (in_header) {
       table.header_.emplace_back(text);
     } else {
@@ -111,8 +111,8 @@ CsvTable::CsvTable(const std::filesystem::path& file) : file_(file) {
   }
 }
 
-CsvTable::Column CsvTable::get_required_column(std::string_view name) const {
-  if (const auto column = get_optional_column(name)) return *column;
+CsvTable::Column CsvTable::require_column(std::string_view name) const {
+  if (const auto column = find_column(name)) return *column;
   constexpr std::size_t max_names_bytes = 500;  // all columns of the program's tables
   std::string names;
   for (const std::string& have : header_) names += (names.empty() ? "" : ", ") + have;
@@ -121,7 +121,7 @@ CsvTable::Column CsvTable::get_required_column(std::string_view name) const {
       "this column is missing; the columns are: " + truncate_text(names, max_names_bytes));
 }
 
-std::optional<CsvTable::Column> CsvTable::get_optional_column(std::string_view name) const {
+std::optional<CsvTable::Column> CsvTable::find_column(std::string_view name) const {
   const auto found = std::find(header_.begin(), header_.end(), name);
   if (found == header_.end()) return std::nullopt;
   return Column{static_cast<std::size_t>(found - header_.begin())};
@@ -142,7 +142,7 @@ double CsvTable::get_cell_number(std::size_t row, Column column) const {
   return *value;
 }
 
-double CsvTable::get_cell_coordinate_m(std::size_t row, Column column) const {
+double CsvTable::get_coordinate_m(std::size_t row, Column column) const {
   const double value_m = get_cell_number(row, column);
   if (std::abs(value_m) > kMaxCoordinate_m) {
     // [FILE-3] `within 1,000 km, in meters`
@@ -162,8 +162,8 @@ int CsvTable::get_cell_integer(std::size_t row, Column column) const {
   return *value;
 }
 
-std::optional<double> CsvTable::get_optional_cell_number(std::size_t row,
-                                                         std::optional<Column> column) const {
+std::optional<double> CsvTable::get_optional_number(std::size_t row,
+                                                    std::optional<Column> column) const {
   if (!column || get_cell_text(row, *column).empty()) return std::nullopt;
   return get_cell_number(row, *column);
 }
@@ -173,8 +173,8 @@ InputError CsvTable::make_cell_error(std::size_t row, Column column,
   return {file_, lines_[row], header_[column.index], problem};
 }
 
-std::string_view read_unique_name_of_row(const CsvTable& csv, std::size_t row,
-                                         CsvTable::Column column, NameIndex& names) {
+std::string_view read_unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
+                                  NameIndex& names) {
   const std::string_view name = csv.get_cell_text(row, column);
   if (name.empty()) throw csv.make_cell_error(row, column, "is empty");
   if (!names.insert_unique_name(name)) {

@@ -32,8 +32,8 @@ class CsvTable {
     std::size_t index;
   };
   /// Returns a column. Throws InputError if a required one is missing.
-  Column get_required_column(std::string_view name) const;
-  std::optional<Column> get_optional_column(std::string_view name) const;
+  Column require_column(std::string_view name) const;
+  std::optional<Column> find_column(std::string_view name) const;
 
   std::size_t num_rows() const { return lines_.size(); }
   std::string_view get_cell_text(std::size_t row, Column column) const;
@@ -41,10 +41,9 @@ class CsvTable {
   double get_cell_number(std::size_t row, Column column) const;
   int get_cell_integer(std::size_t row, Column column) const;
   /// Returns a coordinate in meters. Throws InputError also if it exceeds kMaxCoordinate_m.
-  double get_cell_coordinate_m(std::size_t row, Column column) const;
+  double get_coordinate_m(std::size_t row, Column column) const;
   /// Returns a number; std::nullopt if the column is missing or the field is empty.
-  std::optional<double> get_optional_cell_number(std::size_t row,
-                                                 std::optional<Column> column) const;
+  std::optional<double> get_optional_number(std::size_t row, std::optional<Column> column) const;
 
   /// Returns the line in the file at which a row begins, from 1.
   std::size_t line_number_of_row(std::size_t row) const { return lines_[row]; }
@@ -83,7 +82,7 @@ class NameIndex {
 
 /// Returns the name in a cell and adds it to `names`. Throws InputError if it is empty or occurs in
 /// an earlier row.
-std::string_view read_unique_name_of_row(const CsvTable& csv, std::size_t row,
-                                         CsvTable::Column column, NameIndex& names);
+std::string_view read_unique_name(const CsvTable& csv, std::size_t row, CsvTable::Column column,
+                                  NameIndex& names);
 
 }  // namespace vlp

@@ -38,7 +38,7 @@ void CsvWriter::write_csv_fields(std::span<const std::string_view> fields) {
   for (const std::string_view field : fields) {
     buffer_ += separator;
     separator = ",";
-    if (begins_like_spreadsheet_formula(field) && !is_number(field)) {
+    if (is_like_formula(field) && !is_number(field)) {
       const std::string text = "'" + std::string(field);
       buffer_ += quote_csv_field(std::string_view(text));
       continue;

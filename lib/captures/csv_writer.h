@@ -17,7 +17,7 @@ namespace vlp {
 /// or a carriage return, and has more characters. Leading apostrophes are skipped, so that CsvTable
 /// can remove the one that CsvWriter inserts. Returns true for signed numbers, too; the caller
 /// handles these. Source: OWASP, "CSV Injection".
-constexpr bool begins_like_spreadsheet_formula(std::string_view field) {
+constexpr bool is_like_formula(std::string_view field) {
   const auto first = field.find_first_not_of('\'');
   if (first == std::string_view::npos || first + 1 == field.size()) return false;
   return std::string_view("=+-@\t\r").find(field[first]) != std::string_view::npos;
@@ -25,7 +25,7 @@ constexpr bool begins_like_spreadsheet_formula(std::string_view field) {
 
 /// Writer of a CSV file. Rows are buffered and written to a temporary file; save_file() renames it
 /// atomically to the given path. Fields are quoted if necessary. Text that a spreadsheet would
-/// evaluate gets a leading apostrophe (begins_like_spreadsheet_formula()). All functions throw
+/// evaluate gets a leading apostrophe (is_like_formula()). All functions throw
 /// InputError if the file cannot be written.
 class CsvWriter {
  public:

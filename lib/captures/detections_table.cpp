@@ -12,9 +12,9 @@ namespace vlp {
 
 std::vector<Frame> read_detections(const std::filesystem::path& file) {
   const CsvTable csv(file);
-  const auto image = csv.get_required_column("image"), lamp = csv.get_required_column("lamp");
-  const auto u_px = csv.get_required_column("u_px"), v_px = csv.get_required_column("v_px");
-  const auto sigma_px = csv.get_optional_column("sigma_px");
+  const auto image = csv.require_column("image"), lamp = csv.require_column("lamp");
+  const auto u_px = csv.require_column("u_px"), v_px = csv.require_column("v_px");
+  const auto sigma_px = csv.find_column("sigma_px");
   std::vector<Frame> frames;
   std::unordered_map<std::string, std::size_t> frame_of_image;
   for (std::size_t row = 0; row < csv.num_rows(); ++row) {
@@ -25,7 +25,7 @@ std::vector<Frame> read_detections(const std::filesystem::path& file) {
     auto& detections = frames[entry->second].detections;
     const Detection detection{csv.get_cell_integer(row, lamp),
                               {csv.get_cell_number(row, u_px), csv.get_cell_number(row, v_px)},
-                              csv.get_optional_cell_number(row, sigma_px)};
+                              csv.get_optional_number(row, sigma_px)};
     const double sigma = detection.sigma_px.value_or(1);
     if (sigma < kMinSigma_px || sigma > kMaxSigma_px) {
       throw csv.make_cell_error(row, *sigma_px, "should be within 0.0001 and 1000 px");
@@ -52,7 +52,7 @@ void write_detections(const std::filesystem::path& file, const std::vector<Frame
           {frame.image, std::to_string(detection.lamp),
            format_fixed_decimals(detection.pixel.x(), digits),
            format_fixed_decimals(detection.pixel.y(), digits),
-           detection.sigma_px ? format_significant_digits(*detection.sigma_px, sigma_digits) : ""});
+           detection.sigma_px ? format_digits(*detection.sigma_px, sigma_digits) : ""});
     }
   }
   csv.save_file();

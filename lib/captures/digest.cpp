@@ -41,13 +41,13 @@ class Sha256 {
 
 }  // namespace
 
-std::string compute_text_sha256(std::string_view text) {
+std::string hash_text(std::string_view text) {
   Sha256 sha;
   sha.add(text);
   return sha.to_hex_digits();
 }
 
-std::string compute_file_sha256(const std::filesystem::path& file) {
+std::string hash_file(const std::filesystem::path& file) {
   InputFile input(file, std::numeric_limits<std::size_t>::max());
   Sha256 sha;
   std::array<char, 1 << 16> block;

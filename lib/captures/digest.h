@@ -9,10 +9,10 @@
 namespace vlp {
 
 /// Computes the SHA-256 of a text, in hexadecimal digits.
-std::string compute_text_sha256(std::string_view text);
+std::string hash_text(std::string_view text);
 
 /// Computes the SHA-256 of a file's content. Returns 64 lower-case hexadecimal digits.
 /// @throws InputError if the file cannot be read
-std::string compute_file_sha256(const std::filesystem::path& file);
+std::string hash_file(const std::filesystem::path& file);
 
 }  // namespace vlp

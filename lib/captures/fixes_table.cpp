@@ -18,19 +18,18 @@ namespace {
 
 struct FixColumns {
   explicit FixColumns(const CsvTable& csv)
-      : pose{csv.get_required_column("x_m"), csv.get_required_column("y_m"),
-             csv.get_required_column("z_m"), csv.get_required_column("yaw_rad")},
-        sd{csv.get_optional_column("x_sd_m"), csv.get_optional_column("y_sd_m"),
-           csv.get_optional_column("z_sd_m"), csv.get_optional_column("yaw_sd_rad")},
-        noise_sd{csv.get_optional_column("x_noise_sd_m"), csv.get_optional_column("y_noise_sd_m"),
-                 csv.get_optional_column("z_noise_sd_m"),
-                 csv.get_optional_column("yaw_noise_sd_rad")},
-        residual_px(csv.get_optional_column("residual_px")),
-        time_s(csv.get_optional_column("time_s")),
-        velocity{csv.get_optional_column("vx_m_per_s"), csv.get_optional_column("vy_m_per_s")},
-        lean{csv.get_optional_column("roll_rad"), csv.get_optional_column("pitch_rad")},
-        rejected(csv.get_optional_column("rejected")),
-        outside_region(csv.get_optional_column("outside_region")) {}
+      : pose{csv.require_column("x_m"), csv.require_column("y_m"), csv.require_column("z_m"),
+             csv.require_column("yaw_rad")},
+        sd{csv.find_column("x_sd_m"), csv.find_column("y_sd_m"), csv.find_column("z_sd_m"),
+           csv.find_column("yaw_sd_rad")},
+        noise_sd{csv.find_column("x_noise_sd_m"), csv.find_column("y_noise_sd_m"),
+                 csv.find_column("z_noise_sd_m"), csv.find_column("yaw_noise_sd_rad")},
+        residual_px(csv.find_column("residual_px")),
+        time_s(csv.find_column("time_s")),
+        velocity{csv.find_column("vx_m_per_s"), csv.find_column("vy_m_per_s")},
+        lean{csv.find_column("roll_rad"), csv.find_column("pitch_rad")},
+        rejected(csv.find_column("rejected")),
+        outside_region(csv.find_column("outside_region")) {}
 
   std::array<CsvTable::Column, 4> pose;
   std::array<std::optional<CsvTable::Column>, 4> sd, noise_sd;
@@ -42,8 +41,8 @@ struct FixColumns {
 std::optional<Eigen::Vector2d> read_optional_pair(
     const CsvTable& csv, std::size_t row,
     const std::array<std::optional<CsvTable::Column>, 2>& columns) {
-  const auto a = csv.get_optional_cell_number(row, columns[0]),
-             b = csv.get_optional_cell_number(row, columns[1]);
+  const auto a = csv.get_optional_number(row, columns[0]),
+             b = csv.get_optional_number(row, columns[1]);
   if (!a || !b) return std::nullopt;
   return Eigen::Vector2d(*a, *b);
 }
@@ -54,7 +53,7 @@ std::optional<Eigen::Vector4d> read_sds(
   Eigen::Vector4d sd;
   for (int i = 0; i < 4; ++i) {
     const auto column = columns[static_cast<std::size_t>(i)];
-    const auto value = csv.get_optional_cell_number(row, column);
+    const auto value = csv.get_optional_number(row, column);
     if (!value) return std::nullopt;
     if (*value < 0) throw csv.make_cell_error(row, *column, "should not be negative");
     sd[i] = *value;
@@ -64,11 +63,11 @@ std::optional<Eigen::Vector4d> read_sds(
 
 FixRow::Fix read_fix(const CsvTable& csv, std::size_t row, const FixColumns& columns) {
   const auto [x_m, y_m, z_m, yaw_rad] = columns.pose;
-  FixRow::Fix fix{{{csv.get_cell_coordinate_m(row, x_m), csv.get_cell_coordinate_m(row, y_m),
-                    csv.get_cell_coordinate_m(row, z_m)},
+  FixRow::Fix fix{{{csv.get_coordinate_m(row, x_m), csv.get_coordinate_m(row, y_m),
+                    csv.get_coordinate_m(row, z_m)},
                    csv.get_cell_number(row, yaw_rad)},
                   read_sds(csv, row, columns.sd),
-                  csv.get_optional_cell_number(row, columns.residual_px).value_or(0),
+                  csv.get_optional_number(row, columns.residual_px).value_or(0),
                   read_sds(csv, row, columns.noise_sd)};
   fix.velocity_m_per_s = read_optional_pair(csv, row, columns.velocity);
   if (const auto lean = read_optional_pair(csv, row, columns.lean))
@@ -109,7 +108,7 @@ std::string format_time(const FixRow& row) {
 template <int axis>
 std::string format_noise_sd(const FixRow& row) {
   if (!row.fix || !row.fix->noise_sd) return "";
-  return format_significant_digits((*row.fix->noise_sd)[axis], kSdDigits);
+  return format_digits((*row.fix->noise_sd)[axis], kSdDigits);
 }
 
 template <int axis>
@@ -147,7 +146,7 @@ constexpr std::array<AddedColumn, 11> kAddedColumns{
      {"rejected", format_ids<&FixRow::rejected_lamps>},
      {"outside_region", format_ids<&FixRow::lamps_outside_region>}}};
 
-std::vector<AddedColumn> find_used_columns(const std::vector<FixRow>& rows) {
+std::vector<AddedColumn> select_used_columns(const std::vector<FixRow>& rows) {
   std::vector<AddedColumn> columns;
   for (const AddedColumn& column : kAddedColumns) {
     const bool is_used = std::any_of(rows.begin(), rows.end(),
@@ -163,7 +162,7 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
   std::vector<std::string> header{"image",  "status",     "x_m",    "y_m",
                                   "z_m",    "yaw_rad",    "x_sd_m", "y_sd_m",
                                   "z_sd_m", "yaw_sd_rad", "lamps",  "residual_px"};
-  const auto added = find_used_columns(rows);
+  const auto added = select_used_columns(rows);
   for (const AddedColumn& column : added) header.emplace_back(column.name);
   CsvWriter csv(file, header);
   for (const FixRow& row : rows) {
@@ -176,10 +175,9 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
                                        fix->pose.yaw_rad};
       for (std::size_t i = 0; i < 4; ++i) {
         fields[2 + i] = format_fixed_decimals(pose[i], kDigits);
-        if (fix->sd)
-          fields[6 + i] = format_significant_digits((*fix->sd)[static_cast<int>(i)], kSdDigits);
+        if (fix->sd) fields[6 + i] = format_digits((*fix->sd)[static_cast<int>(i)], kSdDigits);
       }
-      fields[11] = format_significant_digits(fix->residual_px, kSdDigits);
+      fields[11] = format_digits(fix->residual_px, kSdDigits);
     }
     for (const AddedColumn& column : added) fields.push_back(column.text(row));
     csv.write_csv_row(fields);
@@ -189,28 +187,28 @@ void write_fixes(const std::filesystem::path& file, const std::vector<FixRow>& r
 
 std::vector<FixRow> read_fixes(const std::filesystem::path& file) {
   const CsvTable csv(file);
-  const auto image = csv.get_required_column("image"), status = csv.get_required_column("status");
-  const auto lamps = csv.get_optional_column("lamps");
+  const auto image = csv.require_column("image"), status = csv.require_column("status");
+  const auto lamps = csv.find_column("lamps");
   const FixColumns columns(csv);
   NameIndex images(csv.num_rows());
   std::vector<FixRow> rows;
   rows.reserve(csv.num_rows());
   for (std::size_t row = 0; row < csv.num_rows(); ++row) {
-    const auto name = read_unique_name_of_row(csv, row, image, images);
+    const auto name = read_unique_name(csv, row, image, images);
     FixRow& read = rows.emplace_back(FixRow{std::string(name),
                                             std::string(csv.get_cell_text(row, status)),
                                             {},
                                             lamps ? csv.get_cell_integer(row, *lamps) : 0,
                                             csv.line_number_of_row(row)});
     if (read.status.empty()) throw csv.make_cell_error(row, status, "is empty");
-    if (count_bytes_of_utf8_prefix(read.status) != read.status.size()) {
+    if (count_utf8_prefix(read.status) != read.status.size()) {
       throw csv.make_cell_error(row, status, "should be UTF-8");
     }
     if (read.status == "ok") read.fix = read_fix(csv, row, columns);
     if (columns.rejected) read.rejected_lamps = read_id_list(csv, row, *columns.rejected);
     if (columns.outside_region)
       read.lamps_outside_region = read_id_list(csv, row, *columns.outside_region);
-    read.time_s = csv.get_optional_cell_number(row, columns.time_s);
+    read.time_s = csv.get_optional_number(row, columns.time_s);
   }
   if (rows.empty()) throw InputError(file, "contains no fix");
   return rows;

@@ -16,11 +16,11 @@ class Id {
   /// Checks a text and stores it as an id.
   /// @param source  file or database from which the text was read, for the message
   /// @param kind    type of the named object for the message: "camera", "run", ...
-  /// @throws InputError if the text is not an id (is_valid_name_of_camera_or_run())
+  /// @throws InputError if the text is not an id (is_valid())
   Id(std::string text, const std::filesystem::path& source, std::string_view kind);
 
   /// Returns true if a text is an id.
-  static bool is_valid_name_of_camera_or_run(std::string_view text);
+  static bool is_valid(std::string_view text);
 
   const std::string& id_text() const { return text_; }
 

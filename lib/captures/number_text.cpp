@@ -10,7 +10,7 @@ std::string format_fixed_decimals(double value, int digits) {
   return fmt::format("{:.{}f}", value, digits);
 }
 
-std::string format_significant_digits(double value, int digits) {
+std::string format_digits(double value, int digits) {
   return fmt::format("{:.{}g}", value, digits);
 }
 

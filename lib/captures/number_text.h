@@ -10,6 +10,6 @@ namespace vlp {
 std::string format_fixed_decimals(double value, int digits);
 /// Formats a number with at most `digits` significant digits, as printf's %g: without trailing
 /// zeros, with an exponent if it is very small or has more integer digits.
-std::string format_significant_digits(double value, int digits);
+std::string format_digits(double value, int digits);
 
 }  // namespace vlp

@@ -29,8 +29,7 @@ void write_poses(const std::filesystem::path& file, const std::vector<PoseRow>& 
     for (const double value : quaternion) fields.push_back(format_fixed_decimals(value, digits));
     for (int i = 0; i < 6; ++i) {
       for (int k = i; k < 6; ++k) {
-        fields.push_back(
-            row.covariance ? format_significant_digits((*row.covariance)(i, k), sd_digits) : "");
+        fields.push_back(row.covariance ? format_digits((*row.covariance)(i, k), sd_digits) : "");
       }
     }
     csv.write_csv_row(fields);

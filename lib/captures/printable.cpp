@@ -12,7 +12,7 @@ namespace {
 /// Returns true for line separators and marks that change the direction of the text around
 /// them (Unicode Standard Annex 9, section 2): U+061C, U+200E, U+200F, U+2028 to U+202E, U+2066 to
 /// U+2069.
-bool is_text_direction_mark(std::string_view character) {
+bool is_direction_mark(std::string_view character) {
   if (character == "\u061c") return true;
   if (character.size() != 3) return false;
   const auto is_within = [&](const char* low, const char* high) {
@@ -34,7 +34,7 @@ bool is_noncharacter(std::string_view character) {
 bool is_control(std::string_view character) {
   const auto first = static_cast<unsigned char>(character[0]);
   if (first == 0xc2) return static_cast<unsigned char>(character[1]) < 0xa0;
-  return first < 0x20 || first == 0x7f || is_text_direction_mark(character) ||
+  return first < 0x20 || first == 0x7f || is_direction_mark(character) ||
          is_noncharacter(character);
 }
 
@@ -43,7 +43,7 @@ std::string escape_characters(std::string_view text, std::string_view kept) {
   constexpr std::string_view digits = "0123456789abcdef";
   std::string result;
   while (!text.empty()) {
-    const std::size_t length = count_bytes_of_utf8_character(text);
+    const std::size_t length = count_utf8_character(text);
     const std::string_view character = text.substr(0, length);
     if (length > 0 && (!is_control(character) || kept.find(character) != kept.npos)) {
       result += character;
@@ -61,13 +61,9 @@ std::string escape_characters(std::string_view text, std::string_view kept) {
 
 }  // namespace
 
-std::string escape_text_for_terminal(std::string_view text) {
-  return escape_characters(text, "\n\t");
-}
+std::string escape_for_terminal(std::string_view text) { return escape_characters(text, "\n\t"); }
 
-std::string escape_text_for_single_line(std::string_view text) {
-  return escape_characters(text, "");
-}
+std::string escape_for_line(std::string_view text) { return escape_characters(text, ""); }
 
 std::string truncate_utf8_text(std::string text, std::size_t max_bytes) {
   const auto goes_on = [](char byte) { return (static_cast<unsigned char>(byte) & 0xC0) == 0x80; };

@@ -56,7 +56,7 @@ SharedFolder::~SharedFolder() {
   if (descriptor_ >= 0) ::close(descriptor_);
 }
 
-void SharedFolder::check_folder_not_replaced() const {
+void SharedFolder::check_not_replaced() const {
   const auto present = read_status(AT_FDCWD, path_.string());
   struct stat opened {};
   if (present && ::fstat(descriptor_, &opened) == 0 && present->st_dev == opened.st_dev &&
@@ -66,11 +66,11 @@ void SharedFolder::check_folder_not_replaced() const {
   throw InputError(path_, "was moved or replaced while it was in use: restore it, then run again");
 }
 
-fs::path SharedFolder::path_of_open_folder_descriptor() const {
+fs::path SharedFolder::descriptor_path() const {
   return "/proc/self/fd/" + std::to_string(descriptor_);
 }
 
-fs::path SharedFolder::checked_folder_entry_path(const std::string& name) const {
+fs::path SharedFolder::require_entry_path(const std::string& name) const {
   const bool is_one_part = !name.empty() && name != "." && name != ".." &&
                            name.find('/') == std::string::npos &&
                            name.find('\0') == std::string::npos;
@@ -78,7 +78,7 @@ fs::path SharedFolder::checked_folder_entry_path(const std::string& name) const 
   return path_ / name;
 }
 
-std::optional<SharedFolder> SharedFolder::open_subfolder_if_exists(const Id& name) const {
+std::optional<SharedFolder> SharedFolder::open_if_exists(const Id& name) const {
   fs::path path = path_ / name.id_text();
   const int found = ::openat(descriptor_, name.id_text().c_str(), kFolderFlags | O_NOFOLLOW);
   if (found >= 0) return SharedFolder(std::move(path), found);
@@ -90,23 +90,23 @@ std::optional<SharedFolder> SharedFolder::open_subfolder_if_exists(const Id& nam
   fail(path, "cannot be opened");
 }
 
-SharedFolder SharedFolder::open_or_create_subfolder(const Id& name) const {
+SharedFolder SharedFolder::open_or_create(const Id& name) const {
   constexpr mode_t mode = 0777;
   const int made = ::mkdirat(descriptor_, name.id_text().c_str(), mode);
   const int reason = errno;
-  auto folder = open_subfolder_if_exists(name);
+  auto folder = open_if_exists(name);
   if (folder) return std::move(*folder);
   errno = made == 0 ? ENOENT : reason;
   fail(path_ / name.id_text(), "cannot be made");
 }
 
-bool SharedFolder::contains_folder_entry(const std::string& name) const {
-  checked_folder_entry_path(name);
+bool SharedFolder::contains(const std::string& name) const {
+  require_entry_path(name);
   return read_status(descriptor_, name).has_value();
 }
 
 int SharedFolder::open_regular_file(const std::string& name, int flags) const {
-  const fs::path path = checked_folder_entry_path(name);
+  const fs::path path = require_entry_path(name);
   constexpr mode_t mode = 0666;
   // Without waiting for the other end of a pipe.
   const int descriptor =
@@ -126,9 +126,9 @@ int SharedFolder::open_regular_file(const std::string& name, int flags) const {
   throw InputError(path, "is no regular file");
 }
 
-std::optional<std::string> SharedFolder::read_file_if_exists(const std::string& name,
-                                                             std::size_t max_bytes) const {
-  const fs::path path = checked_folder_entry_path(name);
+std::optional<std::string> SharedFolder::read_if_exists(const std::string& name,
+                                                        std::size_t max_bytes) const {
+  const fs::path path = require_entry_path(name);
   const int descriptor = open_regular_file(name, O_RDONLY);
   if (descriptor < 0) {
     if (errno == ENOENT) return std::nullopt;
@@ -138,16 +138,15 @@ std::optional<std::string> SharedFolder::read_file_if_exists(const std::string& 
   return read_file(file);
 }
 
-void SharedFolder::replace_file_atomically(const std::string& name,
-                                           std::string_view content) const {
-  AtomicFileWriter file(path_of_open_folder_descriptor(), name, checked_folder_entry_path(name));
+void SharedFolder::replace_file(const std::string& name, std::string_view content) const {
+  AtomicFileWriter file(descriptor_path(), name, require_entry_path(name));
   file.write(content);
   file.save_file();
 }
 
 bool SharedFolder::rename_file(const std::string& from, const std::string& to) const {
-  const fs::path path = checked_folder_entry_path(from);
-  checked_folder_entry_path(to);
+  const fs::path path = require_entry_path(from);
+  require_entry_path(to);
   if (::renameat(descriptor_, from.c_str(), descriptor_, to.c_str()) == 0) return true;
   if (errno == ENOENT) return false;
   // [FILE-1] `cannot be renamed`, `cannot be removed`
@@ -155,7 +154,7 @@ bool SharedFolder::rename_file(const std::string& from, const std::string& to) c
 }
 
 void SharedFolder::remove_file(const std::string& name) const {
-  const fs::path path = checked_folder_entry_path(name);
+  const fs::path path = require_entry_path(name);
   if (::unlinkat(descriptor_, name.c_str(), 0) != 0 && errno != ENOENT) {
     fail(path, "cannot be removed");
   }
@@ -167,10 +166,10 @@ void SharedFolder::remove_subfolder(const Id& name) const {
   }
 }
 
-void SharedFolder::remove_all_folder_entries() const {
+void SharedFolder::remove_all() const {
   std::error_code error;
   std::vector<fs::path> entries;
-  for (fs::directory_iterator entry(path_of_open_folder_descriptor(), error);
+  for (fs::directory_iterator entry(descriptor_path(), error);
        !error && entry != fs::directory_iterator(); entry.increment(error)) {
     entries.push_back(entry->path());
   }
@@ -180,7 +179,7 @@ void SharedFolder::remove_all_folder_entries() const {
   if (error) throw InputError(path_, "cannot be deleted: " + error.message());
 }
 
-void check_json_size_and_depth(std::string_view text) {
+void check_json_limits(std::string_view text) {
   constexpr std::size_t max_levels = 16, max_values = 1'000'000;
   std::size_t levels = 0, values = 0;
   bool is_in_string = false;

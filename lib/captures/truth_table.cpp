@@ -11,27 +11,26 @@ namespace vlp {
 
 std::vector<TruthRow> read_truth_table(const std::filesystem::path& file) {
   const CsvTable csv(file);
-  const auto image = csv.get_required_column("image");
-  const auto x_m = csv.get_required_column("x_m"), y_m = csv.get_required_column("y_m");
-  const auto z_m = csv.get_optional_column("z_m"), yaw_rad = csv.get_optional_column("yaw_rad");
+  const auto image = csv.require_column("image");
+  const auto x_m = csv.require_column("x_m"), y_m = csv.require_column("y_m");
+  const auto z_m = csv.find_column("z_m"), yaw_rad = csv.find_column("yaw_rad");
   NameIndex images(csv.num_rows());
   std::vector<TruthRow> rows;
   rows.reserve(csv.num_rows());
   for (std::size_t row = 0; row < csv.num_rows(); ++row) {
-    const auto name = read_unique_name_of_row(csv, row, image, images);
+    const auto name = read_unique_name(csv, row, image, images);
     TruthRow& read = rows.emplace_back();
     read.image = name;
-    read.xy_m = {csv.get_cell_coordinate_m(row, x_m), csv.get_cell_coordinate_m(row, y_m)};
-    if (z_m && !csv.get_cell_text(row, *z_m).empty())
-      read.z_m = csv.get_cell_coordinate_m(row, *z_m);
-    read.yaw_rad = csv.get_optional_cell_number(row, yaw_rad);
+    read.xy_m = {csv.get_coordinate_m(row, x_m), csv.get_coordinate_m(row, y_m)};
+    if (z_m && !csv.get_cell_text(row, *z_m).empty()) read.z_m = csv.get_coordinate_m(row, *z_m);
+    read.yaw_rad = csv.get_optional_number(row, yaw_rad);
     read.line = csv.line_number_of_row(row);
   }
   if (rows.empty()) throw InputError(file, "contains no position");
   return rows;
 }
 
-PathPoint find_nearest_point_on_path(const Path& path, const Eigen::Vector2d& position_m) {
+PathPoint project_onto_path(const Path& path, const Eigen::Vector2d& position_m) {
   PathPoint nearest{path.waypoints_m.front(), {}};
   double min_squared_distance = std::numeric_limits<double>::infinity();
   std::size_t leg = 0;
@@ -57,13 +56,12 @@ PathPoint find_nearest_point_on_path(const Path& path, const Eigen::Vector2d& po
 
 Path read_path_table(const std::filesystem::path& file) {
   const CsvTable csv(file);
-  const auto x_m = csv.get_required_column("x_m"), y_m = csv.get_required_column("y_m");
-  const auto z_m = csv.get_optional_column("z_m");
+  const auto x_m = csv.require_column("x_m"), y_m = csv.require_column("y_m");
+  const auto z_m = csv.find_column("z_m");
   Path path;
   for (std::size_t row = 0; row < csv.num_rows(); ++row) {
-    path.waypoints_m.emplace_back(csv.get_cell_coordinate_m(row, x_m),
-                                  csv.get_cell_coordinate_m(row, y_m));
-    if (z_m) path.z_m.push_back(csv.get_cell_coordinate_m(row, *z_m));
+    path.waypoints_m.emplace_back(csv.get_coordinate_m(row, x_m), csv.get_coordinate_m(row, y_m));
+    if (z_m) path.z_m.push_back(csv.get_coordinate_m(row, *z_m));
   }
   const bool leads_somewhere =
       std::any_of(path.waypoints_m.begin(), path.waypoints_m.end(),

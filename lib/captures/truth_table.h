@@ -41,7 +41,7 @@ struct PathPoint {
 };
 
 /// Returns the point of a path closest to a position.
-PathPoint find_nearest_point_on_path(const Path& path, const Eigen::Vector2d& position_m);
+PathPoint project_onto_path(const Path& path, const Eigen::Vector2d& position_m);
 
 /// Reads a path. Columns: x_m, y_m and, optionally, z_m.
 /// @throws InputError as CsvTable; if a coordinate exceeds kMaxCoordinate_m; if there are fewer

@@ -16,8 +16,7 @@ constexpr const char* kProblem = "images cannot be read or written";
 
 const Codecs& load_codecs() {
   // Binding the functions of all its libraries at once takes 15 ms.
-  return *load_library_function<const Codecs*()>(VLP_CODECS_LIBRARY, "vlp_codecs", kProblem,
-                                                 RTLD_LAZY)();
+  return *load_function<const Codecs*()>(VLP_CODECS_LIBRARY, "vlp_codecs", kProblem, RTLD_LAZY)();
 }
 
 /// Returns true if the header is that of a gray PNG image with 8 or 16 bits. The signature and the
@@ -32,7 +31,7 @@ bool is_gray_png(std::string_view bytes) {
 
 /// Decodes a gray PNG image. Returns an empty matrix if it cannot be decoded.
 cv::Mat decode_gray_png(std::string_view bytes) {
-  static auto* const decode = load_library_function<bool(std::string_view, cv::Mat&)>(
+  static auto* const decode = load_function<bool(std::string_view, cv::Mat&)>(
       VLP_PNG_LIBRARY, "vlp_decode_gray_png", kProblem, RTLD_LAZY);
   cv::Mat image;
   return decode(bytes, image) ? image : cv::Mat();

@@ -8,8 +8,8 @@
 
 namespace vlp {
 
-void* load_library_symbol(const char* library, const char* function, const std::string& problem,
-                          int binding) {
+void* load_symbol(const char* library, const char* function, const std::string& problem,
+                  int binding) {
   void* const loaded = ::dlopen(library, binding | RTLD_LOCAL);
   if (loaded == nullptr) {
     throw std::runtime_error(problem + ": " + ::dlerror() + ": install the programs again");

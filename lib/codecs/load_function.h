@@ -6,9 +6,9 @@
 
 namespace vlp {
 
-/// Returns the address of a function of a shared library; implements load_library_function().
-void* load_library_symbol(const char* library, const char* function, const std::string& problem,
-                          int binding);
+/// Returns the address of a function of a shared library; implements load_function().
+void* load_symbol(const char* library, const char* function, const std::string& problem,
+                  int binding);
 
 /// Loads a shared library and returns one of its functions. The library is searched in the run path
 /// of the program and is never unloaded.
@@ -22,11 +22,11 @@ void* load_library_symbol(const char* library, const char* function, const std::
 /// @return           the function, not null
 /// @throws std::runtime_error if the library cannot be loaded or lacks the function
 template <typename Function>
-Function* load_library_function(const char* library, const char* function,
-                                const std::string& problem, int binding) {
+Function* load_function(const char* library, const char* function, const std::string& problem,
+                        int binding) {
   // POSIX allows the conversion of a symbol's address to a function pointer.
   return reinterpret_cast<Function*>(  // NOLINT
-      load_library_symbol(library, function, problem, binding));
+      load_symbol(library, function, problem, binding));
 }
 
 }  // namespace vlp

@@ -23,24 +23,24 @@ Path make_reference_path(const EvaluationInput& input) {
 }
 
 void add_horizontal(Evaluation& evaluation, const std::vector<FixError>& errors, int threads) {
-  auto [sizes_m, clusters] = collect_values_and_clusters_of_fix_errors(
-      errors, [](const FixError& error) { return error.horizontal_m.norm(); });
-  evaluation.intervals_m = bootstrap_error_intervals(sizes_m, clusters, threads);
-  evaluation.horizontal_m = compute_error_statistics(sizes_m);
-  evaluation.distribution_m = compute_error_percentiles(std::move(sizes_m));
+  auto [sizes_m, clusters] =
+      collect_component(errors, [](const FixError& error) { return error.horizontal_m.norm(); });
+  evaluation.intervals_m = bootstrap_intervals(sizes_m, clusters, threads);
+  evaluation.horizontal_m = summarize_errors(sizes_m);
+  evaluation.distribution_m = list_percentiles(std::move(sizes_m));
 }
 
-std::optional<SignedErrorStatistics> compute_signed_statistics(
-    const std::vector<FixError>& errors, std::optional<double> FixError::*part) {
-  auto values = collect_values_and_clusters_of_fix_errors(errors, std::mem_fn(part)).values;
+std::optional<SignedErrorStatistics> summarize_part(const std::vector<FixError>& errors,
+                                                    std::optional<double> FixError::*part) {
+  auto values = collect_component(errors, std::mem_fn(part)).values;
   if (values.empty()) return std::nullopt;
-  return compute_signed_error_statistics(std::move(values));
+  return summarize_signed_errors(std::move(values));
 }
 
 /// Returns the largest of the normalized errors of x and y, height and yaw; 0 if they are unknown.
-double compute_largest_normalized_error(const std::vector<FixRow>& fixes,
-                                        const std::vector<FixError>& errors) {
-  const auto ratios = compute_normalized_errors(fixes, errors);
+double compute_max_normalized_error(const std::vector<FixRow>& fixes,
+                                    const std::vector<FixError>& errors) {
+  const auto ratios = normalize_errors(fixes, errors);
   if (!ratios) return 0;
   return std::max({ratios->horizontal, ratios->height.value_or(0), ratios->yaw.value_or(0)});
 }
@@ -54,8 +54,8 @@ void check_other_fixes(const EvaluationInput& input, const std::vector<FixError>
   }
   if (!input.truth) return;
   constexpr double min_error = 20, min_ratio = 10;
-  const double error = compute_largest_normalized_error(input.fixes.rows, errors);
-  const double other_error = compute_largest_normalized_error(others.rows, other_errors);
+  const double error = compute_max_normalized_error(input.fixes.rows, errors);
+  const double other_error = compute_max_normalized_error(others.rows, other_errors);
   if (other_error < std::max(min_error, min_ratio * error)) return;
   throw InputError(others.file, fmt::format("its errors are {:.3g} times the reported sd, those of "
                                             "the fixes {:.3g} times: is it of these captures, in "
@@ -65,7 +65,7 @@ void check_other_fixes(const EvaluationInput& input, const std::vector<FixError>
 
 void add_comparison(Evaluation& evaluation, const EvaluationInput& input,
                     const std::vector<FixError>& errors) {
-  if (!input.truth) check_same_images_in_fixes(input.fixes, *input.other_fixes);
+  if (!input.truth) check_same_images(input.fixes, *input.other_fixes);
   const FixErrors others = compute_fix_errors(input, *input.other_fixes);
   check_other_fixes(input, errors, others.errors);
   evaluation.comparison = compare_fix_errors(input.fixes.rows, errors, input.other_fixes->rows,
@@ -75,12 +75,11 @@ void add_comparison(Evaluation& evaluation, const EvaluationInput& input,
 }  // namespace
 
 FixErrors compute_fix_errors(const EvaluationInput& input, const FileRows<FixRow>& fixes) {
-  if (input.truth)
-    return compute_fix_errors_against_truth(fixes, *input.truth, input.reference_point_radius_m);
-  return compute_fix_errors_against_path(fixes.rows, make_reference_path(input));
+  if (input.truth) return compare_with_truth(fixes, *input.truth, input.reference_point_radius_m);
+  return compare_with_path(fixes.rows, make_reference_path(input));
 }
 
-Evaluation evaluate_fix_accuracy(const EvaluationInput& input) {
+Evaluation evaluate_fixes(const EvaluationInput& input) {
   const auto [captures, missing, errors] = compute_fix_errors(input, input.fixes);
   Evaluation evaluation;
   evaluation.reference = input.truth ? "truth" : input.path ? "path" : "line";
@@ -89,27 +88,27 @@ Evaluation evaluate_fix_accuracy(const EvaluationInput& input) {
   evaluation.failures_by_status = missing;
   if (errors.empty()) return evaluation;
   add_horizontal(evaluation, errors, input.threads);
-  evaluation.height_m = compute_signed_statistics(errors, &FixError::height_m);
-  evaluation.yaw_rad = compute_signed_statistics(errors, &FixError::yaw_rad);
+  evaluation.height_m = summarize_part(errors, &FixError::height_m);
+  evaluation.yaw_rad = summarize_part(errors, &FixError::yaw_rad);
   evaluation.resampling_unit = "runs of fixes";
   if (input.truth) {
     evaluation.bias_and_repeatability = compute_bias_and_repeatability(errors, input.truth->rows);
     evaluation.resampling_unit =
         evaluation.bias_and_repeatability ? "reference points" : "captures";
     evaluation.systematic_errors = describe_systematic_errors(input.fixes, *input.truth, errors);
-    evaluation.normalized_errors = compute_normalized_errors(input.fixes.rows, errors);
+    evaluation.normalized_errors = normalize_errors(input.fixes.rows, errors);
   }
   if (input.truth && input.crlb_input) {
     const auto& [lamps, camera, noise_px] = *input.crlb_input;
-    evaluation.crlb_ratio = compute_error_to_crlb_ratio(errors, input.truth->rows, lamps, camera,
-                                                        noise_px, input.threads);
+    evaluation.crlb_ratio =
+        compute_crlb_ratio(errors, input.truth->rows, lamps, camera, noise_px, input.threads);
   }
   if (input.line_m) evaluation.line_fit = fit_line_to_fixes(input.fixes.rows, *input.line_m);
   if (input.other_fixes) add_comparison(evaluation, input, errors);
   return evaluation;
 }
 
-std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
+std::vector<Metric> collect_metrics(const Evaluation& evaluation) {
   std::vector<Metric> metrics;
   const auto add = [&](const char* name, double value) { metrics.push_back({name, value}); };
   const auto add_mm = [&](const char* name, double value_m) { add(name, 1e3 * value_m); };
@@ -138,7 +137,7 @@ std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
     add_mm("fitted_max_mm", fit->distances_m.max);
   }
   if (const auto& comparison = evaluation.comparison; comparison) {
-    for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
+    for (std::size_t i = 0; const ComparedQuantity& quantity : list_quantities()) {
       const QuantityComparison& compared = comparison->quantities[i++];
       if (compared.pairs > 0) add(quantity.metric, quantity.units_per_si * compared.compute_loss());
     }
@@ -148,12 +147,12 @@ std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation) {
   return metrics;
 }
 
-std::vector<Gate> make_default_comparison_gates(const std::vector<Metric>& metrics) {
+std::vector<Gate> make_comparison_gates(const std::vector<Metric>& metrics) {
   std::vector<Gate> gates;
   const auto add = [&](const char* metric) {
     if (find_metric_value(metrics, metric)) gates.push_back({metric, 0});
   };
-  for (const ComparedQuantity& quantity : list_compared_quantities()) add(quantity.metric);
+  for (const ComparedQuantity& quantity : list_quantities()) add(quantity.metric);
   add(kUnpairedMetric);
   return gates;
 }

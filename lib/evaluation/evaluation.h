@@ -78,14 +78,14 @@ FixErrors compute_fix_errors(const EvaluationInput& input, const FileRows<FixRow
 
 /// Evaluates the fixes of `input`.
 /// @throws InputError if image names do not match
-Evaluation evaluate_fix_accuracy(const EvaluationInput& input);
+Evaluation evaluate_fixes(const EvaluationInput& input);
 
 /// Returns the metrics of MetricSource::evaluation and ::reference that were measured, in their
 /// order.
-std::vector<Metric> collect_evaluation_metrics(const Evaluation& evaluation);
+std::vector<Metric> collect_metrics(const Evaluation& evaluation);
 
 /// Returns gates of 0 for the metrics of the comparison that were measured: no quantity may be
 /// worse than in the other fixes, and no capture may escape the comparison.
-std::vector<Gate> make_default_comparison_gates(const std::vector<Metric>& metrics);
+std::vector<Gate> make_comparison_gates(const std::vector<Metric>& metrics);
 
 }  // namespace vlp

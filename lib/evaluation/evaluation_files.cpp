@@ -116,7 +116,7 @@ Json to_json(const Comparison& comparison) {
             {"only_in_fixes", comparison.only_in_fixes},
             {"only_in_compared", comparison.only_in_other_fixes},
             {"unpaired", comparison.unpaired}};
-  for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
+  for (std::size_t i = 0; const ComparedQuantity& quantity : list_quantities()) {
     const QuantityComparison& compared = comparison.quantities[i++];
     if (i == 1 || compared.pairs > 0) json[quantity.key] = to_json(compared, quantity);
   }
@@ -130,7 +130,7 @@ Json to_json(const std::vector<CheckedMetric>& gates) {
                     {"unit", gate.unit},
                     {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
                     {"limit", gate.limit.value()},
-                    {"direction", describe_limit_direction(gate.direction)},
+                    {"direction", describe_direction(gate.direction)},
                     {"passed", gate.has_passed_gate()}});
   }
   return list;
@@ -140,8 +140,8 @@ bool is_gate_failed(const CheckedMetric& gate) { return !gate.has_passed_gate();
 
 }  // namespace
 
-std::string format_evaluation_json(const Evaluation& evaluation,
-                                   const std::vector<CheckedMetric>& gates) {
+std::string format_evaluation(const Evaluation& evaluation,
+                              const std::vector<CheckedMetric>& gates) {
   Json json{{"format", "vlp-evaluation/4"},
             {"reference", evaluation.reference},
             {"captures", evaluation.captures},
@@ -182,7 +182,7 @@ void check_accepted_fixes(const std::filesystem::path& fixes) {
   constexpr std::size_t max_bytes = 1 << 16;
   const std::filesystem::path origin = fixes.string() + ".origin";
   if (!std::filesystem::exists(origin)) return;
-  const std::string wanted = "sha256 " + compute_file_sha256(fixes) + "\n";
+  const std::string wanted = "sha256 " + hash_file(fixes) + "\n";
   if (read_text_file(origin, max_bytes).find(wanted) != std::string::npos) return;
   throw InputError(fixes, "was changed after it was accepted, according to " +
                               origin.filename().string() +

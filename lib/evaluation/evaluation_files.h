@@ -28,8 +28,8 @@ namespace vlp {
 ///                 difference, and the smallest difference that matters
 ///   gates         name, unit, value, limit, direction ("at most" or "at least"), passed
 ///   passed        true if all gates are passed
-std::string format_evaluation_json(const Evaluation& evaluation,
-                                   const std::vector<CheckedMetric>& gates);
+std::string format_evaluation(const Evaluation& evaluation,
+                              const std::vector<CheckedMetric>& gates);
 
 /// Checks that accepted fixes are unchanged since scripts/ci/accept-fixes.sh recorded their digest
 /// in FIXES.origin, if there is such a file.

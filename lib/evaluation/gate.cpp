@@ -24,13 +24,13 @@ std::string join_names(const std::vector<MetricKind>& known) {
 }
 
 std::string with_unit(double value, const std::string& unit) {
-  return format_significant_digits(value, kDigits) + (unit.empty() ? "" : " " + unit);
+  return format_digits(value, kDigits) + (unit.empty() ? "" : " " + unit);
 }
 
 /// Returns an error message on an invalid limit; empty if it is valid.
-std::string describe_invalid_limit(const MetricKind& kind, double limit) {
+std::string describe_limit(const MetricKind& kind, double limit) {
   constexpr int digits = 6;
-  const std::string text = format_significant_digits(limit, digits);
+  const std::string text = format_digits(limit, digits);
   if (limit < 0) return "should not be negative, as no metric is below zero: " + text;
   if (limit == 0 && kind.direction == Direction::at_least) {
     return "should be above 0, which is always met";
@@ -40,12 +40,10 @@ std::string describe_invalid_limit(const MetricKind& kind, double limit) {
     return "should be at most " + with_unit(kind.max_limit, kind.unit) + ", not " + text;
   }
   return "should be a fraction from 0 to 1, not " + text +
-         (limit > 100
-              ? ""
-              : ": for " + text + " % say " + format_significant_digits(limit / 100, digits));
+         (limit > 100 ? "" : ": for " + text + " % say " + format_digits(limit / 100, digits));
 }
 
-CheckedMetric make_checked_metric(const MetricKind& kind, const std::vector<Metric>& metrics) {
+CheckedMetric check_metric(const MetricKind& kind, const std::vector<Metric>& metrics) {
   return {kind.name, kind.unit, find_metric_value(metrics, kind.name), {}, kind.direction};
 }
 
@@ -98,7 +96,7 @@ Gate parse_gate(const std::string& text, const std::vector<MetricKind>& known) {
   if (failure != std::errc() || stop != end || !std::isfinite(limit)) {
     throw std::invalid_argument("gate '" + text + "' should be NAME=VALUE with a finite number");
   }
-  if (const std::string problem = describe_invalid_limit(*kind, limit); !problem.empty()) {
+  if (const std::string problem = describe_limit(*kind, limit); !problem.empty()) {
     throw std::invalid_argument("gate '" + name + "' " + problem);
   }
   return {name, limit};
@@ -125,7 +123,7 @@ std::vector<Gate> read_gates(const YamlValue& value, const std::vector<MetricKin
     const auto limit = map.find(kind.name);
     if (!limit) continue;
     gates.push_back({kind.name, limit->read_number()});
-    const std::string problem = describe_invalid_limit(kind, gates.back().limit);
+    const std::string problem = describe_limit(kind, gates.back().limit);
     if (!problem.empty()) throw limit->make_error(problem);
   }
   map.check_all_keys_read();
@@ -160,19 +158,19 @@ std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
   std::vector<CheckedMetric> results;
   results.reserve(gates.size());
   for (const Gate& gate : gates) {
-    results.push_back(make_checked_metric(find_metric_kind(gate.metric).value(), metrics));
+    results.push_back(check_metric(find_metric_kind(gate.metric).value(), metrics));
     results.back().limit = gate.limit;
     results.back().guard_band = gate.guard_band;
   }
   return results;
 }
 
-std::vector<CheckedMetric> check_all_metrics_against_gates(const std::vector<Gate>& gates,
-                                                           const std::vector<Metric>& metrics,
-                                                           const std::vector<MetricKind>& known) {
+std::vector<CheckedMetric> check_against_gates(const std::vector<Gate>& gates,
+                                               const std::vector<Metric>& metrics,
+                                               const std::vector<MetricKind>& known) {
   std::vector<CheckedMetric> results;
   for (const MetricKind& kind : known) {
-    CheckedMetric result = make_checked_metric(kind, metrics);
+    CheckedMetric result = check_metric(kind, metrics);
     for (const Gate& gate : gates) {
       if (gate.metric != kind.name) continue;
       result.limit = gate.limit;
@@ -183,9 +181,9 @@ std::vector<CheckedMetric> check_all_metrics_against_gates(const std::vector<Gat
   return results;
 }
 
-std::string describe_gate_result(const CheckedMetric& gate) {
+std::string describe_gate(const CheckedMetric& gate) {
   return gate.name + " is " + (gate.value ? with_unit(*gate.value, gate.unit) : "not known") +
-         ", " + describe_limit_direction(gate.direction) + " " +
+         ", " + describe_direction(gate.direction) + " " +
          with_unit(gate.limit.value(), gate.unit) + describe_guard_band(gate) + " is required";
 }
 
@@ -199,16 +197,15 @@ std::string describe_failed_gates(const std::vector<CheckedMetric>& gates) {
   std::string words;
   for (const CheckedMetric& gate : gates) {
     if (!gate.has_passed_gate())
-      words.append(words.empty() ? "" : "; ").append(describe_gate_result(gate));
+      words.append(words.empty() ? "" : "; ").append(describe_gate(gate));
   }
   return words;
 }
 
 std::string describe_failed_gate(const CheckedMetric& gate) {
-  if (!gate.value) return describe_gate_result(gate);
+  if (!gate.value) return describe_gate(gate);
   const auto kind = find_metric_kind(gate.name);
-  return std::string(kind ? kind->cause : "a gate is not met") + " (" + describe_gate_result(gate) +
-         ")";
+  return std::string(kind ? kind->cause : "a gate is not met") + " (" + describe_gate(gate) + ")";
 }
 
 }  // namespace vlp

@@ -91,24 +91,24 @@ std::vector<CheckedMetric> check_gates(const std::vector<Gate>& gates,
 
 /// Returns all metrics, with and without gates, and the gates whose metric was not measured. They
 /// are in the order of the kinds.
-std::vector<CheckedMetric> check_all_metrics_against_gates(const std::vector<Gate>& gates,
-                                                           const std::vector<Metric>& metrics,
-                                                           const std::vector<MetricKind>& known);
+std::vector<CheckedMetric> check_against_gates(const std::vector<Gate>& gates,
+                                               const std::vector<Metric>& metrics,
+                                               const std::vector<MetricKind>& known);
 
 /// Describes a gate, for example "mean_mm is 1.25 mm, at most 1 mm is required". With a guard
 /// band, "less a guard band of 0.04 mm" follows the limit.
 /// @pre there is a gate
-std::string describe_gate_result(const CheckedMetric& gate);
+std::string describe_gate(const CheckedMetric& gate);
 
 /// Returns " less a guard band of 0.04 mm", or " and ..." for lower limits; empty without a guard
 /// band.
 std::string describe_guard_band(const CheckedMetric& gate);
 
-/// Returns describe_gate_result() for all gates that are not passed, separated by "; ".
+/// Returns describe_gate() for all gates that are not passed, separated by "; ".
 std::string describe_failed_gates(const std::vector<CheckedMetric>& gates);
 
-/// Returns the probable cause of a failed gate, followed by describe_gate_result();
-/// describe_gate_result() alone if the metric was not measured.
+/// Returns the probable cause of a failed gate, followed by describe_gate();
+/// describe_gate() alone if the metric was not measured.
 std::string describe_failed_gate(const CheckedMetric& gate);
 
 }  // namespace vlp

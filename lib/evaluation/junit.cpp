@@ -15,8 +15,7 @@ void append_test(pugi::xml_node suite, const std::string& suite_name, const JUni
   pugi::xml_node node = suite.append_child("testcase");
   node.append_attribute("classname") = suite_name.c_str();
   node.append_attribute("name") = test.name.c_str();
-  const std::string message =
-      escape_text_for_terminal(test.message);  // XML has no control characters
+  const std::string message = escape_for_terminal(test.message);  // XML has no control characters
   if (test.result == JUnitTest::Result::failed) {
     node.append_child("failure").append_attribute("message") = message.c_str();
   }
@@ -27,13 +26,13 @@ void append_test(pugi::xml_node suite, const std::string& suite_name, const JUni
   }
   std::string warnings;
   for (const std::string& warning : test.warnings)
-    warnings.append(escape_text_for_terminal(warning)).append("\n");
+    warnings.append(escape_for_terminal(warning)).append("\n");
   if (!warnings.empty()) node.append_child("system-err").text() = warnings.c_str();
 }
 
 }  // namespace
 
-std::vector<JUnitTest> make_junit_tests_from_gates(std::span<const CheckedMetric> gates) {
+std::vector<JUnitTest> make_gate_tests(std::span<const CheckedMetric> gates) {
   std::vector<JUnitTest> tests;
   tests.reserve(gates.size());
   for (const CheckedMetric& gate : gates) {

@@ -31,7 +31,7 @@ struct JUnitTest {
 /// Returns a test for each gate, in their order; `failed` with describe_failed_gate() if the gate
 /// is not passed.
 /// @pre all have a limit
-std::vector<JUnitTest> make_junit_tests_from_gates(std::span<const CheckedMetric> gates);
+std::vector<JUnitTest> make_gate_tests(std::span<const CheckedMetric> gates);
 
 /// Formats a report of one suite as JUnit XML, for CI systems. Errors become `error`, failures
 /// `failure`, warnings `system-err`.

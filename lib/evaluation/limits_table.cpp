@@ -11,14 +11,14 @@
 
 namespace vlp {
 
-void write_floor_accuracy_limits(const std::filesystem::path& file, const FloorLimits& limits) {
+void write_floor_limits(const std::filesystem::path& file, const FloorLimits& limits) {
   constexpr int digits = 6;
   std::vector<std::string> header{"x_m",    "y_m",    "z_m",    "yaw_rad",   "lamps",
                                   "x_sd_m", "y_sd_m", "z_sd_m", "yaw_sd_rad"};
   for (const auto& [name, key] : limits.sources) header.push_back(std::string(key) + "_m");
   header.emplace_back("horizontal_m");
   CsvWriter csv(file, header);
-  const auto format = [](double value) { return format_significant_digits(value, digits); };
+  const auto format = [](double value) { return format_digits(value, digits); };
   for (const FloorLimits::Position& place : limits.positions) {
     const auto& [position_m, yaw_rad] = place.camera;
     std::vector<std::string> row{format(position_m.x()), format(position_m.y()),

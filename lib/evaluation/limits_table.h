@@ -18,6 +18,6 @@ namespace vlp {
 ///   horizontal_m                  horizontal standard deviation from all sources together
 /// Standard deviations of positions without a fix are empty.
 /// @throws InputError if the file cannot be written
-void write_floor_accuracy_limits(const std::filesystem::path& file, const FloorLimits& limits);
+void write_floor_limits(const std::filesystem::path& file, const FloorLimits& limits);
 
 }  // namespace vlp

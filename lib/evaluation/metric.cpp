@@ -178,7 +178,7 @@ constexpr auto kMetricKinds = std::to_array<MetricKind>({
 
 }  // namespace
 
-std::string describe_limit_direction(Direction required) {
+std::string describe_direction(Direction required) {
   return required == Direction::at_least ? "at least" : "at most";
 }
 

@@ -28,7 +28,7 @@ enum class MetricSource {
 enum class Direction { at_most, at_least };
 
 /// Returns "at most" or "at least".
-std::string describe_limit_direction(Direction direction);
+std::string describe_direction(Direction direction);
 
 /// Metric that can be measured and that a gate may limit.
 struct MetricKind {

@@ -20,41 +20,40 @@ constexpr double kNormalQuantile999 = 3.0902, kNormalQuantile975 = 1.96;
 /// Smallest margin, relative to the value, and in mm or degrees.
 constexpr double kMinRelativeMargin = 0.01, kMinMargin = 0.001;
 
-double round_up_to_three_digits(double value) {
+double round_up(double value) {
   constexpr double last_digit = 2;  // last of three significant digits
   constexpr double numeric_tolerance = 1e-9;
   const double step = std::pow(10, std::floor(std::log10(value)) - last_digit);
   return step * std::ceil(value / step - numeric_tolerance);
 }
 
-double compute_proposed_limit(double value, const Interval& interval) {
+double propose_limit(double value, const Interval& interval) {
   // The larger half: for quantiles, the interval ends at errors that occurred, so one end may be
   // too near.
   const double half_width = std::max(interval.high - value, value - interval.low);
   const double standard_error = half_width / kNormalQuantile975;
   const double margin = std::max({kNormalQuantile999 * std::numbers::sqrt2 * standard_error,
                                   kMinRelativeMargin * value, kMinMargin});
-  return round_up_to_three_digits(value + margin);
+  return round_up(value + margin);
 }
 
 /// Computes the intervals of the absolute values of a part, without errors that lack it.
 std::optional<ErrorIntervals> compute_intervals(const std::vector<FixError>& errors,
                                                 std::optional<double> FixError::*part,
                                                 int threads) {
-  auto [sizes, clusters] = collect_values_and_clusters_of_fix_errors(errors, std::mem_fn(part));
+  auto [sizes, clusters] = collect_component(errors, std::mem_fn(part));
   for (double& size : sizes) size = std::abs(size);
-  return bootstrap_error_intervals(sizes, clusters, threads);
+  return bootstrap_intervals(sizes, clusters, threads);
 }
 
 }  // namespace
 
-std::vector<Gate> propose_gates_from_evaluation(const EvaluationInput& input,
-                                                const Evaluation& evaluation) {
+std::vector<Gate> propose_gates(const EvaluationInput& input, const Evaluation& evaluation) {
   std::vector<Gate> gates;
   if (!evaluation.intervals_m) return gates;
   const auto add = [&](const char* name, double value, const Interval& interval, double scale) {
-    gates.push_back({name, compute_proposed_limit(scale * value,
-                                                  {scale * interval.low, scale * interval.high})});
+    gates.push_back(
+        {name, propose_limit(scale * value, {scale * interval.low, scale * interval.high})});
   };
   constexpr double millimeters = 1e3, degrees = 180 / std::numbers::pi;
   const ErrorIntervals& horizontal_m = *evaluation.intervals_m;
@@ -80,7 +79,7 @@ std::string format_gates(const std::vector<Gate>& gates, const Evaluation& evalu
       "an\n# error in about 1 of 200 cases (40 reference points; more often with fewer). The limit "
       "of missing_fraction is\n# the fraction of this run.\nformat: vlp-gates/1\ngates:\n",
       evaluation.fixes, evaluation.captures);
-  const std::vector<Metric> metrics = collect_evaluation_metrics(evaluation);
+  const std::vector<Metric> metrics = collect_metrics(evaluation);
   for (const Gate& gate : gates) {
     text += fmt::format("  {}: {:.6g}  # {:.4g} measured\n", gate.metric, gate.limit,
                         find_metric_value(metrics, gate.metric).value_or(0));

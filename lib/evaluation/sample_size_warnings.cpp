@@ -10,7 +10,7 @@ namespace vlp {
 namespace {
 
 /// Number of clusters from which percentile intervals are nearly as wide as they should be, see
-/// bootstrap_error_intervals().
+/// bootstrap_intervals().
 constexpr std::size_t kSufficientClusters = 50;
 
 std::string describe_small_sample(std::size_t clusters, const std::string& resampling_unit) {
@@ -19,8 +19,8 @@ std::string describe_small_sample(std::size_t clusters, const std::string& resam
 
 }  // namespace
 
-std::string make_missing_fixes_warning(const Evaluation& evaluation,
-                                       const std::vector<CheckedMetric>& gates) {
+std::string warn_about_missing_fixes(const Evaluation& evaluation,
+                                     const std::vector<CheckedMetric>& gates) {
   const std::size_t missing = evaluation.captures - evaluation.fixes;
   const bool has_gate = std::any_of(gates.begin(), gates.end(), [](const CheckedMetric& gate) {
     return gate.name == "missing_fraction";
@@ -33,19 +33,19 @@ std::string make_missing_fixes_warning(const Evaluation& evaluation,
          " no fix, and there is no gate 'missing_fraction'";
 }
 
-std::string make_errors_below_crlb_warning(const Evaluation& evaluation) {
+std::string warn_about_crlb(const Evaluation& evaluation) {
   const auto& limit = evaluation.crlb_ratio;
   if (!limit || !limit->are_errors_below_crlb()) return "";
   constexpr int digits = 3;
   // [GATE-3] `limit: either` | less noise than `--noise-px`, or fixes of several images | check
   //   `--noise-px`
-  return "the errors are " + format_significant_digits(limit->horizontal, digits) +
+  return "the errors are " + format_digits(limit->horizontal, digits) +
          " times the theoretical limit: either the stated pixel noise is too large, or the fixes "
          "use more information than one image of a level camera with completely visible lamps "
          "(other frames, a known height, partly visible lamps, a tilted camera)";
 }
 
-std::vector<std::string> make_sample_size_warnings(const Evaluation& evaluation) {
+std::vector<std::string> warn_about_sample_size(const Evaluation& evaluation) {
   std::vector<std::string> warnings;
   const std::string& resampling_unit = evaluation.resampling_unit;
   if (const auto& intervals = evaluation.intervals_m; !intervals) {

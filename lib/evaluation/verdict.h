@@ -28,7 +28,7 @@ constexpr const char* verdict_name(Verdict verdict) {
 }
 
 /// Returns the word in session.json: "pass", "gate" or "no result".
-constexpr const char* session_verdict_name(Verdict verdict) {
+constexpr const char* verdict_text(Verdict verdict) {
   constexpr std::array names{"pass", "gate", "no result"};
   return names[static_cast<std::size_t>(verdict)];
 }
@@ -43,7 +43,7 @@ struct Cause {
 
 /// Returns the verdict of the first cause, because later causes can follow from it; PASS without
 /// causes.
-inline Verdict decide_verdict_from_causes(const std::vector<Cause>& causes) {
+inline Verdict decide_verdict(const std::vector<Cause>& causes) {
   if (causes.empty()) return Verdict::pass;
   return causes.front().is_camera_fault ? Verdict::fail : Verdict::invalid;
 }

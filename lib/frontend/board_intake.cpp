@@ -30,7 +30,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Returns the box around the corners of the board; the whole image if there are none.
-cv::Rect find_board_region(const BoardDetection& seen, const cv::Mat& image) {
+cv::Rect get_board_region(const BoardDetection& seen, const cv::Mat& image) {
   std::vector<cv::Point2f> corners;
   const auto add = [&](const Eigen::Vector2d& pixel) {
     corners.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
@@ -57,7 +57,7 @@ double compute_median_edge_px(const Board& board, const BoardDetection& seen) {
                          point.index % static_cast<std::size_t>(board.cols - 1) != 0;
     if (is_next) edges_px.push_back((point.pixel - before.pixel).norm());
   }
-  if (!board.has_chessboard_squares()) {
+  if (!board.has_squares()) {
     for (const TagDetection& tag : seen.tags) {
       for (std::size_t k = 0; k < 4; ++k)
         edges_px.push_back((tag.corners_px[(k + 1) % 4] - tag.corners_px[k]).norm());
@@ -68,7 +68,7 @@ double compute_median_edge_px(const Board& board, const BoardDetection& seen) {
 
 /// Returns the median of the reported standard deviations of the corners, px; std::nullopt if half
 /// of the corners have none.
-std::optional<double> compute_median_corner_sd_px(const BoardDetection& seen) {
+std::optional<double> compute_median_sd_px_of(const BoardDetection& seen) {
   std::vector<double> sds_px;
   for (const PointDetection& corner : collect_detected_corners(seen)) {
     sds_px.push_back(corner.sd_px > 0 ? corner.sd_px : std::numeric_limits<double>::infinity());
@@ -79,9 +79,9 @@ std::optional<double> compute_median_corner_sd_px(const BoardDetection& seen) {
 }
 
 /// Describes which searches did not find a chessboard, and the largest part of one.
-std::string describe_missing_chessboard(const Board& board, const BoardDetection& seen,
-                                        const std::array<int, 2>& size_px) {
-  const auto [finest, coarsest] = get_range_of_chessboard_reductions({size_px[0], size_px[1]});
+std::string explain_chessboard(const Board& board, const BoardDetection& seen,
+                               const std::array<int, 2>& size_px) {
+  const auto [finest, coarsest] = get_reduction_range({size_px[0], size_px[1]});
   std::string message =
       fmt::format("no complete chessboard of {} x {} squares", board.cols, board.rows);
   const auto [cols, rows] = seen.largest_chessboard_part;
@@ -105,12 +105,12 @@ std::string describe_missing_chessboard(const Board& board, const BoardDetection
                        finest, coarsest);
 }
 
-std::string describe_too_few_corners(const Board& board, const BoardDetection& seen,
-                                     const std::array<int, 2>& size_px) {
+std::string explain_corners(const Board& board, const BoardDetection& seen,
+                            const std::array<int, 2>& size_px) {
   if (board.kind == BoardKind::chessboard && seen.points.empty()) {
-    return describe_missing_chessboard(board, seen, size_px);
+    return explain_chessboard(board, seen, size_px);
   }
-  if (board.has_chessboard_squares() || !seen.points.empty()) {
+  if (board.has_squares() || !seen.points.empty()) {
     return fmt::format("only {} corners of the board can be used, or too many of them in a line",
                        seen.points.size());
   }
@@ -140,8 +140,7 @@ void reject_other_sizes(std::vector<Observation>& images) {
   const std::array<int, 2> size_px = most_frequent->size_px;
   for (Observation& image : images) {
     if (!image.board || image.size_px == size_px) continue;
-    image.set_image_rejection(RejectionReason::wrong_size,
-                              describe_wrong_image_size(image.size_px, size_px));
+    image.reject(RejectionReason::wrong_size, explain_image_size(image.size_px, size_px));
     image.board.reset();
   }
 }
@@ -250,7 +249,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
   explain_from_sample_images(
       images, options, num_samples, [&](const fs::path& file, const cv::Mat& image) {
         white = std::max(white, compute_saturated_fraction(image, cv::Rect({}, image.size())));
-        description = find_and_describe_tags_of_other_kinds(board, image);
+        description = describe_other_tags(board, image);
         described_file = file;
         return description.empty();
       });
@@ -285,7 +284,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
                         layout.empty() ? "" : "; " + layout),
             board_file};
   }
-  const char* tag = board.has_chessboard_squares() ? "marker" : "tag";
+  const char* tag = board.has_squares() ? "marker" : "tag";
   return {false, fmt::format("no {} of {} is visible in {} images: is the board in them, sharp, "
                              "well lit, and each {} wider than 20 px?",
                              tag, board.family, views.size(), tag)};
@@ -294,8 +293,7 @@ IntakeFailure explain_no_board(const std::vector<fs::path>& images, const Board&
 /// Rejects corners that contradict their neighbors. A tag is rejected as a whole. Returns a
 /// description; empty if no corner is rejected.
 std::string remove_corner_outliers(const BoardLattice& lattice, BoardView& view) {
-  const auto blunders =
-      find_corner_outliers(lattice.list_corners_with_board_positions(view.detection));
+  const auto blunders = list_corner_outliers(lattice.list_corners(view.detection));
   if (blunders.empty()) return "";
   const auto corners = collect_detected_corners(view.detection);
   const Eigen::Vector2d first = corners[blunders.front()].pixel;
@@ -323,20 +321,18 @@ bool is_mrcal_table(const fs::path& file) { return file.extension() == ".vnl"; }
 /// Rejects an image with too few corners to determine the pose of the board.
 void reject_few_corners(const Board& board, const BoardLattice& lattice, Observation& image) {
   const BoardDetection& seen = image.board->detection;
-  if (lattice.are_corners_sufficient_for_pose(seen)) return;
-  if (!seen.has_detected_corners() && !seen.foreign_tags.empty()) {
+  if (lattice.can_determine_pose(seen)) return;
+  if (!seen.has_corners() && !seen.foreign_tags.empty()) {
     // [LENS-3] `the board does not have`, `not show the board` | other board, or wrong `first_id`,
     //   `cols`, `rows`, `id_order` | correct `board.yaml`
-    return image.set_image_rejection(RejectionReason::other_board,
-                                     "shows tags that the board does not have");
+    return image.reject(RejectionReason::other_board, "shows tags that the board does not have");
   }
-  if (!seen.has_detected_corners() && seen.num_unusable_tags == 0 &&
-      board.kind != BoardKind::chessboard) {
-    return image.set_image_rejection(RejectionReason::no_board, "does not show the board");
+  if (!seen.has_corners() && seen.num_unusable_tags == 0 && board.kind != BoardKind::chessboard) {
+    return image.reject(RejectionReason::no_board, "does not show the board");
   }
-  image.set_image_rejection(
+  image.reject(
       are_tags_overexposed(seen) ? RejectionReason::overexposed : RejectionReason::too_few_corners,
-      describe_too_few_corners(board, seen, image.size_px));
+      explain_corners(board, seen, image.size_px));
 }
 
 }  // namespace
@@ -350,17 +346,17 @@ BoardIntake::BoardIntake(const Board& board, const FrontendOptions& options,
       imager_px_(imager_px),
       cache_(options.corner_cache, board) {}
 
-Observation BoardIntake::detect_board_in_image(const SourceImage& source) const {
+Observation BoardIntake::detect_board(const SourceImage& source) const {
   Observation result{source.file, source.time_s};
   std::optional<CachedView> found = cache_.find_cached_view(source);
   if (found && (!imager_px_ || found->view.imager_px == *imager_px_)) {
     result.size_px = found->view.imager_px;
   } else {
-    read_image_and_run_detection(source, options_, imager_px_, result, [&](const cv::Mat& image) {
+    read_and_detect(source, options_, imager_px_, result, [&](const cv::Mat& image) {
       const ImageBlur blur = measure_image_blur(image);
       BoardView view{result.image_file_name(), result.size_px, detector_.detect_board(image)};
       const double white =
-          compute_saturated_fraction(image, find_board_region(view.detection, image));
+          compute_saturated_fraction(image, get_board_region(view.detection, image));
       found = CachedView{std::move(view),
                          std::isfinite(blur.sigma_px) ? std::optional(blur.sigma_px) : std::nullopt,
                          blur.bright_fraction, white};
@@ -370,22 +366,22 @@ Observation BoardIntake::detect_board_in_image(const SourceImage& source) const 
   }
   result.blur_px = found->blur_px;
   result.board = std::move(found->view);
-  reject_unusable_board_image(result, found->bright_fraction, found->white_fraction);
+  reject_unusable(result, found->bright_fraction, found->white_fraction);
   return result;
 }
 
-void BoardIntake::reject_unusable_board_image(Observation& image, double bright_fraction,
-                                              double white_fraction) const {
+void BoardIntake::reject_unusable(Observation& image, double bright_fraction,
+                                  double white_fraction) const {
   const BoardDetection& seen = image.board->detection;
-  const bool has_pose = lattice_.are_corners_sufficient_for_pose(seen);
+  const bool has_pose = lattice_.can_determine_pose(seen);
   if (white_fraction > options_.max_white_fraction) {
     constexpr double max_sd_px = 0.25;
-    const auto sd_px = has_pose ? compute_median_corner_sd_px(seen) : std::nullopt;
+    const auto sd_px = has_pose ? compute_median_sd_px_of(seen) : std::nullopt;
     const std::string text =
         fmt::format("overexposed: {:.0f} % of the {} is at full scale", 100 * white_fraction,
-                    seen.has_detected_corners() ? "board" : "image");
+                    seen.has_corners() ? "board" : "image");
     if (!sd_px || *sd_px > max_sd_px) {
-      return image.set_image_rejection(
+      return image.reject(
           RejectionReason::overexposed,
           fmt::format("{}, {:.0f} % at most; expose shorter (limit: --max-white-fraction)", text,
                       100 * options_.max_white_fraction));
@@ -395,20 +391,19 @@ void BoardIntake::reject_unusable_board_image(Observation& image, double bright_
   }
   if (!has_pose && bright_fraction < options_.min_bright_fraction) {
     // [LENS-1] `too dark:` | corners not measurable, or displaced | change exposure or light
-    return image.set_image_rejection(
-        RejectionReason::too_dark,
-        fmt::format("too dark: the brightest 1 % reach {:.0f} % of the full scale, "
-                    "{:.0f} % at least",
-                    100 * bright_fraction, 100 * options_.min_bright_fraction));
+    return image.reject(RejectionReason::too_dark,
+                        fmt::format("too dark: the brightest 1 % reach {:.0f} % of the full scale, "
+                                    "{:.0f} % at least",
+                                    100 * bright_fraction, 100 * options_.min_bright_fraction));
   }
   // [LENS-2] `no contrast` | no sharp edges | focus, hold still
-  if (!image.blur_px) return image.set_image_rejection(RejectionReason::no_contrast, "no contrast");
-  const std::string problem = describe_too_much_blur(image);
-  if (!problem.empty()) return image.set_image_rejection(RejectionReason::blurred, problem);
+  if (!image.blur_px) return image.reject(RejectionReason::no_contrast, "no contrast");
+  const std::string problem = describe_blur(image);
+  if (!problem.empty()) return image.reject(RejectionReason::blurred, problem);
   reject_few_corners(board_, lattice_, image);
 }
 
-std::string BoardIntake::describe_too_much_blur(const Observation& image) const {
+std::string BoardIntake::describe_blur(const Observation& image) const {
   // Half a bit of a tag of eight bits; a square needs corners with a saddle.
   constexpr double max_tag_fraction = 0.06, max_square_fraction = 0.2;
   const double in_image_px =
@@ -420,7 +415,7 @@ std::string BoardIntake::describe_too_much_blur(const Observation& image) const 
         *image.blur_px, in_image_px, options_.max_blur_fraction);
   }
   const double edge_px = compute_median_edge_px(board_, image.board->detection);
-  const bool has_squares = board_.has_chessboard_squares();
+  const bool has_squares = board_.has_squares();
   const double on_board_px = (has_squares ? max_square_fraction : max_tag_fraction) * edge_px;
   if (edge_px == 0 || *image.blur_px <= on_board_px) return "";
   return fmt::format(
@@ -429,19 +424,19 @@ std::string BoardIntake::describe_too_much_blur(const Observation& image) const 
       *image.blur_px, on_board_px, has_squares ? "squares" : "tags", edge_px);
 }
 
-Observations detect_boards_in_images(const std::vector<fs::path>& images, const Board& board,
-                                     const fs::path& board_file, const FrontendOptions& options,
-                                     const IntakeProgress& progress) {
+Observations detect_boards(const std::vector<fs::path>& images, const Board& board,
+                           const fs::path& board_file, const FrontendOptions& options,
+                           const IntakeProgress& progress) {
   const BoardIntake intake(board, options);
   ImageSource source(images, options);
-  Observations result = collect_observations_of_images(
-      source, options.threads,
-      [&](const SourceImage& image) { return intake.detect_board_in_image(image); }, progress);
-  check_any_image_readable(images.front().parent_path(), result.images);
+  Observations result = collect_observations(
+      source, options.threads, [&](const SourceImage& image) { return intake.detect_board(image); },
+      progress);
+  check_any_readable(images.front().parent_path(), result.images);
   reject_other_sizes(result.images);
-  reject_repeated_images(result.images, ImageUse::boards, options);
+  reject_repeated(result.images, ImageUse::boards, options);
   if (std::none_of(result.images.begin(), result.images.end(), [](const Observation& image) {
-        return image.board && image.board->detection.has_detected_corners();
+        return image.board && image.board->detection.has_corners();
       })) {
     result.failure =
         explain_no_board(images, board, board_file, options, collect_views(result.images));
@@ -462,7 +457,7 @@ Observations read_board_views(const fs::path& file, const Board& board, const fs
   for (BoardView& view : is_mrcal_table(file) ? read_mrcal_corners(file, board, imager_px)
                                               : read_corner_table(file, board, imager_px)) {
     std::string doubt = remove_corner_outliers(lattice, view);
-    is_seen = is_seen || view.detection.has_detected_corners();
+    is_seen = is_seen || view.detection.has_corners();
     Observation image{view.image};
     image.doubt = std::move(doubt);
     image.size_px = view.imager_px;
@@ -470,7 +465,7 @@ Observations read_board_views(const fs::path& file, const Board& board, const fs
     reject_few_corners(board, lattice, image);
     result.images.push_back(std::move(image));
   }
-  reject_repeated_images(result.images, ImageUse::boards, options);
+  reject_repeated(result.images, ImageUse::boards, options);
   if (!is_seen) {
     result.failure = {true,
                       fmt::format("none of its {} images has a corner of the board; is it of "

@@ -31,14 +31,13 @@ class BoardIntake {
   /// dark, blurred, overexposed with inaccurate corners, or shows too few corners to determine the
   /// board's pose. An overexposed image with accurate corners has an Observation::doubt.
   /// Repeated images are not rejected here, see Selection.
-  Observation detect_board_in_image(const SourceImage& source) const;
+  Observation detect_board(const SourceImage& source) const;
 
  private:
   /// Rejects an image that is overexposed, too dark, blurred, or shows too few corners.
-  void reject_unusable_board_image(Observation& image, double bright_fraction,
-                                   double white_fraction) const;
+  void reject_unusable(Observation& image, double bright_fraction, double white_fraction) const;
   /// Returns the reason why an image with a measured blur is too blurred; empty if it is not.
-  std::string describe_too_much_blur(const Observation& image) const;
+  std::string describe_blur(const Observation& image) const;
 
   const Board board_;
   const BoardLattice lattice_;
@@ -55,17 +54,16 @@ class BoardIntake {
 /// Sets Observations::failure if no image shows the board. Its file is `board_file` if the images
 /// show another board.
 /// @throws InputError if no image can be read
-Observations detect_boards_in_images(const std::vector<std::filesystem::path>& images,
-                                     const Board& board, const std::filesystem::path& board_file,
-                                     const FrontendOptions& options,
-                                     const IntakeProgress& progress = {});
+Observations detect_boards(const std::vector<std::filesystem::path>& images, const Board& board,
+                           const std::filesystem::path& board_file, const FrontendOptions& options,
+                           const IntakeProgress& progress = {});
 
 /// Returns true if the extension is that of a file of corners: .vnl of mrcal, or .csv.
 bool is_corner_file(const std::filesystem::path& file);
 
 /// Reads the corners of a board from a file of mrcal (read_mrcal_corners()) or from a table
 /// (read_corner_table()), instead of images of size `imager_px`. Selects views as
-/// detect_boards_in_images() does. Rejects corners that contradict their neighbors, with a warning.
+/// detect_boards() does. Rejects corners that contradict their neighbors, with a warning.
 /// @throws InputError if the file cannot be read
 Observations read_board_views(const std::filesystem::path& file, const Board& board,
                               const std::filesystem::path& board_file,

@@ -21,15 +21,13 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string describe_settings(const Board& board) {
-  std::string settings =
-      fmt::format("14 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols,
-                  board.rows, format_shortest_exact_number(board.tag_size_m),
-                  format_shortest_exact_number(board.tag_spacing), board.border_bits,
-                  board.corner_squares, board.first_id, id_order_name(board.id_order));
-  if (board.has_chessboard_squares()) {
-    settings +=
-        fmt::format(" {} {} {}", static_cast<int>(board.kind),
-                    format_shortest_exact_number(board.square_size_m), board.top_left_white);
+  std::string settings = fmt::format(
+      "14 {} {} {} {} {} {} {} {} {} {}", VLP_VERSION, board.family, board.cols, board.rows,
+      format_exact_number(board.tag_size_m), format_exact_number(board.tag_spacing),
+      board.border_bits, board.corner_squares, board.first_id, id_order_name(board.id_order));
+  if (board.has_squares()) {
+    settings += fmt::format(" {} {} {}", static_cast<int>(board.kind),
+                            format_exact_number(board.square_size_m), board.top_left_white);
   }
   return settings;
 }
@@ -50,7 +48,7 @@ class NumberFile {
   /// text is cut short or damaged.
   void transfer(double& value) {
     if (!is_read_) {
-      text_ += format_shortest_exact_number(value) + " ";
+      text_ += format_exact_number(value) + " ";
       return;
     }
     const char* const end = text_.data() + text_.size();
@@ -136,10 +134,10 @@ void transfer_view(NumberFile& file, CachedView& cached) {
 }
 
 std::string compute_digest(const SourceImage& image) {
-  if (image.frame.empty()) return compute_file_sha256(image.file);
+  if (image.frame.empty()) return hash_file(image.file);
   const cv::Mat levels = image.frame.isContinuous() ? image.frame : image.frame.clone();
   const std::string bytes(levels.ptr<char>(), levels.total() * levels.elemSize());
-  return compute_text_sha256(fmt::format("{} {} {}", levels.cols, levels.rows, bytes));
+  return hash_text(fmt::format("{} {} {}", levels.cols, levels.rows, bytes));
 }
 
 }  // namespace
@@ -153,15 +151,15 @@ CornerCache::CornerCache(fs::path folder, const Board& board)
   if (error) throw InputError(folder_, "cannot be made: " + error.message());
 }
 
-fs::path CornerCache::make_cache_file_path(const SourceImage& image) const {
-  return folder_ / (compute_text_sha256(compute_digest(image) + " " + settings_) + ".txt");
+fs::path CornerCache::make_file_path(const SourceImage& image) const {
+  return folder_ / (hash_text(compute_digest(image) + " " + settings_) + ".txt");
 }
 
 std::optional<CachedView> CornerCache::find_cached_view(const SourceImage& image) const {
   constexpr std::size_t max_bytes = std::size_t{64} << 20;
   if (folder_.empty()) return std::nullopt;
   try {
-    const fs::path path = make_cache_file_path(image);
+    const fs::path path = make_file_path(image);
     if (!fs::exists(path)) return std::nullopt;
     NumberFile file(read_file(path, max_bytes));
     CachedView cached{{image.file.filename().string(), {}, {}}, {}, 0, 0};
@@ -177,7 +175,7 @@ void CornerCache::store_cached_view(const SourceImage& image, CachedView view) c
   try {
     NumberFile numbers;
     transfer_view(numbers, view);
-    AtomicFileWriter file(make_cache_file_path(image));
+    AtomicFileWriter file(make_file_path(image));
     file.write(numbers.text());
     file.save_without_fsync();
   } catch (const InputError&) {  // a full disk; the view itself is there

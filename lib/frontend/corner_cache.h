@@ -41,7 +41,7 @@ class CornerCache {
   void store_cached_view(const SourceImage& image, CachedView view) const;
 
  private:
-  std::filesystem::path make_cache_file_path(const SourceImage& image) const;
+  std::filesystem::path make_file_path(const SourceImage& image) const;
 
   std::filesystem::path folder_;
   std::string settings_;

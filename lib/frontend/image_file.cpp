@@ -212,18 +212,18 @@ const ImageFormat* find_format(std::string_view bytes) {
 
 bool has_image_signature(std::string_view bytes) { return find_format(bytes) != nullptr; }
 
-Size read_image_size_from_header(std::string_view bytes) {
+Size read_header_size(std::string_view bytes) {
   const ImageFormat* const format = find_format(bytes);
   return format == nullptr ? Size() : format->read_size(bytes);
 }
 
-void check_image_megapixels(const fs::path& file, std::int64_t width, std::int64_t height,
-                            double max_mpx) {
+void check_megapixels(const fs::path& file, std::int64_t width, std::int64_t height,
+                      double max_mpx) {
   constexpr double million = 1e6;
   if (static_cast<double>(width) * static_cast<double>(height) <= max_mpx * million) return;
   throw InputError(
       file, "is " + std::to_string(width) + " x " + std::to_string(height) + " px, more than the " +
-                format_shortest_exact_number(max_mpx) +
+                format_exact_number(max_mpx) +
                 " million that are allowed; --max-mpx of vlp-detect and vlp-intrinsics "
                 "allows more");
 }
@@ -234,7 +234,7 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
   const char* const cut = "cannot be read as an image: it is cut short";
   if (is_cut_jpeg(bytes)) throw InputError(file, cut);
   // Other formats are rejected, because the memory that they need is unknown before decoding.
-  const auto size = read_image_size_from_header(bytes);
+  const auto size = read_header_size(bytes);
   if (!size) {
     // [FILE-7] `cannot be read as an image` | damaged, raw, or of another format; other images are
     //   used | save in a listed format
@@ -243,7 +243,7 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
                   ? "cannot be read as an image: it is cut short or damaged"
                   : "cannot be read as an image: it is not PNG, JPEG, BMP, TIFF, PBM, PGM or PPM");
   }
-  check_image_megapixels(file, (*size)[0], (*size)[1], max_mpx);
+  check_megapixels(file, (*size)[0], (*size)[1], max_mpx);
   if (is_cut_png(bytes)) throw InputError(file, cut);
   cv::Mat image;
   try {
@@ -252,7 +252,7 @@ cv::Mat read_image(const fs::path& file, double max_mpx) {
     throw InputError(file, "cannot be read as an image: " + failure.err);
   }
   if (image.empty()) throw InputError(file, "cannot be read as an image");
-  check_image_megapixels(file, image.cols, image.rows, max_mpx);
+  check_megapixels(file, image.cols, image.rows, max_mpx);
   if (image.depth() != CV_8U && image.depth() != CV_16U) {
     throw InputError(file, "has neither 8 nor 16 bits");
   }
@@ -290,7 +290,7 @@ std::vector<fs::path> list_images(const fs::path& folder) {
   return images;
 }
 
-std::vector<fs::path> replace_folders_by_images(const std::vector<std::string>& names) {
+std::vector<fs::path> expand_folders(const std::vector<std::string>& names) {
   std::vector<fs::path> files;
   for (const std::string& name : names) {
     if (!fs::is_directory(name)) {

@@ -16,8 +16,8 @@
 namespace vlp {
 
 /// Checks that an image has at most `max_mpx` megapixels. Throws InputError otherwise.
-void check_image_megapixels(const std::filesystem::path& file, std::int64_t width,
-                            std::int64_t height, double max_mpx);
+void check_megapixels(const std::filesystem::path& file, std::int64_t width, std::int64_t height,
+                      double max_mpx);
 
 /// Returns true if `bytes` starts with the signature of PNG, JPEG, BMP, TIFF, PBM, PGM or PPM.
 /// `bytes` is a file or its beginning.
@@ -26,7 +26,7 @@ bool has_image_signature(std::string_view bytes);
 /// Parses width and height in pixels from the header of a PNG, JPEG, BMP, TIFF, PBM, PGM or PPM
 /// file. The image is not decoded, because a file of a megabyte can contain gigapixels. Returns
 /// std::nullopt for other files, and for files truncated before the size.
-std::optional<std::array<std::int64_t, 2>> read_image_size_from_header(std::string_view bytes);
+std::optional<std::array<std::int64_t, 2>> read_header_size(std::string_view bytes);
 
 /// Reads an image as gray levels of 8 or 16 bits and converts color. The format is recognized by
 /// the content: PNG, JPEG, BMP, TIFF, PBM, PGM or PPM. An orientation tag in the file is ignored,
@@ -51,6 +51,6 @@ std::vector<std::filesystem::path> list_images(const std::filesystem::path& fold
 
 /// Replaces each folder among the names by the images in it.
 /// @throws InputError as list_images()
-std::vector<std::filesystem::path> replace_folders_by_images(const std::vector<std::string>& names);
+std::vector<std::filesystem::path> expand_folders(const std::vector<std::string>& names);
 
 }  // namespace vlp

@@ -65,7 +65,7 @@ double estimate_noise(const cv::Mat& image) {
 }
 
 /// Returns the darkest and the brightest median of a pixel and its neighbors on both sides.
-std::pair<double, double> find_gray_level_extremes(const cv::Mat& image, const cv::Point& side) {
+std::pair<double, double> compute_level_extremes(const cv::Mat& image, const cv::Point& side) {
   if (image.cols < 3 || image.rows < 3) return {0, 0};
   const cv::Rect inner(side, cv::Size(image.cols - 2 * side.x, image.rows - 2 * side.y));
   const cv::Mat before = image(inner - side), here = image(inner), after = image(inner + side);
@@ -100,9 +100,9 @@ ImageBlur measure_image_blur(const cv::Mat& image) {
   return {std::sqrt(std::max(0.0, variance_px2)), bright};
 }
 
-ImageSignal measure_image_signal_to_noise(const cv::Mat& image) {
-  const auto [dark_along, bright_along] = find_gray_level_extremes(image, {1, 0});
-  const auto [dark_across, bright_across] = find_gray_level_extremes(image, {0, 1});
+ImageSignal measure_image_signal(const cv::Mat& image) {
+  const auto [dark_along, bright_along] = compute_level_extremes(image, {1, 0});
+  const auto [dark_across, bright_across] = compute_level_extremes(image, {0, 1});
   const double dark = std::min(dark_along, dark_across);
   const double bright = std::max(bright_along, bright_across);
   return {dark / get_full_scale_level(image), (bright - dark) / estimate_noise(image)};

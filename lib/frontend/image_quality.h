@@ -35,7 +35,7 @@ struct ImageSignal {
 };
 
 /// Measures the signal of an image of 8 or 16 bits.
-ImageSignal measure_image_signal_to_noise(const cv::Mat& image);
+ImageSignal measure_image_signal(const cv::Mat& image);
 
 /// Computes the fraction of white pixels in a region of an image of 8 or 16 bits. White is full
 /// scale or one 8-bit level below. Returns 0 for a region outside the image.

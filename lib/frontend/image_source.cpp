@@ -25,8 +25,8 @@ ImageSource::ImageSource(std::vector<std::filesystem::path> files, const Fronten
     }
     Video video(file.string());
     const auto [width, height] = video.frame_size_px();
-    check_image_megapixels(file, width, height, options.max_mpx);
-    check_image_size_matches_imager(file, {width, height}, imager_px);
+    check_megapixels(file, width, height, options.max_mpx);
+    check_image_size(file, {width, height}, imager_px);
     // [FILE-8] `no frame that can be decoded`
     if (!video.read_next_frame()) throw InputError(file, "contains no frame that can be decoded");
     const auto every = static_cast<std::size_t>(every_);
@@ -38,7 +38,7 @@ ImageSource::~ImageSource() = default;
 
 std::size_t ImageSource::expected_image_count() const { return expected_; }
 
-std::optional<SourceImage> ImageSource::read_next_video_frame() {
+std::optional<SourceImage> ImageSource::read_video_frame() {
   const auto& file = files_[file_];
   if (!video_) {
     video_ = std::make_unique<Video>(file.string());
@@ -47,12 +47,12 @@ std::optional<SourceImage> ImageSource::read_next_video_frame() {
   }
   auto frame = video_->read_next_frame();
   if (!frame) {
-    const std::string missing = video_->describe_missing_frames();
+    const std::string missing = video_->describe_missing();
     if (!missing.empty()) warnings_.push_back(file.string() + ": " + missing);
     video_.reset();
     return {};
   }
-  SourceImage image(make_video_frame_name(file.string(), frame->number));
+  SourceImage image(make_frame_name(file.string(), frame->number));
   image.frame = std::move(frame->image);
   image.time_s = frame->time_s;
   return image;
@@ -63,7 +63,7 @@ std::optional<SourceImage> ImageSource::read_next_image() {
   for (; file_ < files_.size(); ++file_) {
     std::optional<SourceImage> image;
     if (is_video_file_name(files_[file_])) {
-      image = read_next_video_frame();
+      image = read_video_frame();
       if (!image) continue;
     } else {
       image.emplace(files_[file_++]);
@@ -74,9 +74,8 @@ std::optional<SourceImage> ImageSource::read_next_image() {
   return {};
 }
 
-void process_images_in_parallel(std::size_t count, int threads,
-                                const std::function<void(std::size_t)>& process,
-                                const std::function<void(std::size_t done)>& progress) {
+void process_images(std::size_t count, int threads, const std::function<void(std::size_t)>& process,
+                    const std::function<void(std::size_t done)>& progress) {
   cv::setNumThreads(1);
   std::mutex counting;
   std::size_t done = 0;
@@ -92,7 +91,7 @@ void for_each_image(ImageSource& source, int threads,
                     const std::function<void(const SourceImage&)>& task) {
   const auto workers = static_cast<std::size_t>(threads);
   std::atomic<bool> failed = false;
-  process_images_in_parallel(workers, threads, [&](std::size_t) {
+  process_images(workers, threads, [&](std::size_t) {
     try {
       while (!failed) {
         const auto image = source.read_next_image();
@@ -106,17 +105,16 @@ void for_each_image(ImageSource& source, int threads,
   });
 }
 
-std::string describe_wrong_image_size(const std::array<int, 2>& size_px,
-                                      const std::array<int, 2>& imager_px) {
+std::string explain_image_size(const std::array<int, 2>& size_px,
+                               const std::array<int, 2>& imager_px) {
   return fmt::format("is {} x {} px, the camera's images are {} x {} px", size_px[0], size_px[1],
                      imager_px[0], imager_px[1]);
 }
 
-void check_image_size_matches_imager(const std::filesystem::path& file,
-                                     const std::array<int, 2>& size_px,
-                                     const std::optional<std::array<int, 2>>& imager_px) {
+void check_image_size(const std::filesystem::path& file, const std::array<int, 2>& size_px,
+                      const std::optional<std::array<int, 2>>& imager_px) {
   if (!imager_px || size_px == *imager_px) return;
-  throw InputError(file, describe_wrong_image_size(size_px, *imager_px));
+  throw InputError(file, explain_image_size(size_px, *imager_px));
 }
 
 }  // namespace vlp

@@ -25,7 +25,7 @@ class Video;
 struct SourceImage {
   explicit SourceImage(std::filesystem::path image_file) : file(std::move(image_file)) {}
 
-  /// Path of the image file, or for a frame of a video its name by make_video_frame_name():
+  /// Path of the image file, or for a frame of a video its name by make_frame_name():
   /// VIDEO#000123.
   std::filesystem::path file;
   /// Pixels of a video's frame; empty for an image file.
@@ -62,7 +62,7 @@ class ImageSource {
   const std::vector<std::string>& video_warnings() const { return warnings_; }
 
  private:
-  std::optional<SourceImage> read_next_video_frame();
+  std::optional<SourceImage> read_video_frame();
 
   std::vector<std::filesystem::path> files_;
   int every_;
@@ -77,23 +77,21 @@ class ImageSource {
 /// run.
 ///
 /// @param progress  called with the number of images done; calls do not overlap; may be empty
-void process_images_in_parallel(std::size_t count, int threads,
-                                const std::function<void(std::size_t)>& process,
-                                const std::function<void(std::size_t done)>& progress = {});
+void process_images(std::size_t count, int threads, const std::function<void(std::size_t)>& process,
+                    const std::function<void(std::size_t done)>& progress = {});
 
 /// Calls task(image) for each image of the source on several threads, as
-/// process_images_in_parallel().
+/// process_images().
 void for_each_image(ImageSource& source, int threads,
                     const std::function<void(const SourceImage&)>& task);
 
 /// Describes that the size of an image is not that of the camera.
-std::string describe_wrong_image_size(const std::array<int, 2>& size_px,
-                                      const std::array<int, 2>& imager_px);
+std::string explain_image_size(const std::array<int, 2>& size_px,
+                               const std::array<int, 2>& imager_px);
 
 /// Checks that the size of an image is `imager_px` (width, height), if given. Throws InputError
 /// otherwise.
-void check_image_size_matches_imager(const std::filesystem::path& file,
-                                     const std::array<int, 2>& size_px,
-                                     const std::optional<std::array<int, 2>>& imager_px);
+void check_image_size(const std::filesystem::path& file, const std::array<int, 2>& size_px,
+                      const std::optional<std::array<int, 2>>& imager_px);
 
 }  // namespace vlp

@@ -10,8 +10,7 @@
 namespace vlp {
 namespace {
 
-std::unordered_map<std::string, const Frame*> index_frames_by_image(
-    const std::vector<Frame>& labels) {
+std::unordered_map<std::string, const Frame*> index_frames(const std::vector<Frame>& labels) {
   std::unordered_map<std::string, const Frame*> frames;
   for (const Frame& frame : labels) frames[frame.image] = &frame;
   return frames;
@@ -23,7 +22,7 @@ bool may_be_lamp(const Light& light, const std::array<int, 2>& size_px) {
 
 }  // namespace
 
-const Light* find_light_near_pixel(const Observation& image, const Eigen::Vector2d& pixel) {
+const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel) {
   constexpr double max_distance_fraction = 0.5;
   const Light* nearest = nullptr;
   for (const Light& light : image.lights) {
@@ -37,14 +36,14 @@ const Light* find_light_near_pixel(const Observation& image, const Eigen::Vector
 
 void add_labeled_lights(std::span<const Observation> images, const std::vector<Frame>& labels,
                         LabeledLights& labeled) {
-  const auto frames = index_frames_by_image(labels);
+  const auto frames = index_frames(labels);
   std::size_t number = labeled.lights.empty() ? 0 : labeled.lights.back().image + 1;
   for (const Observation& image : images) {
     const auto frame = frames.find(image.image_file_name());
     if (frame == frames.end() || !image.is_image_kept()) continue;
     for (const Detection& label : frame->second->detections) {
       ++labeled.num_labels;
-      if (const Light* light = find_light_near_pixel(image, label.pixel)) {
+      if (const Light* light = find_light(image, label.pixel)) {
         labeled.lights.push_back({label.lamp, light->stripes, number});
       } else {
         ++labeled.num_labels_without_light;
@@ -54,9 +53,9 @@ void add_labeled_lights(std::span<const Observation> images, const std::vector<F
   }
 }
 
-std::vector<LightPeriod> collect_light_periods(std::span<const Observation> images,
-                                               const std::vector<Frame>& labels) {
-  const auto frames = index_frames_by_image(labels);
+std::vector<LightPeriod> collect_periods(std::span<const Observation> images,
+                                         const std::vector<Frame>& labels) {
+  const auto frames = index_frames(labels);
   std::vector<LightPeriod> periods;
   const auto add = [&](std::size_t image, const Light& light, std::optional<int> lamp) {
     const Stripes& stripes = light.stripes;
@@ -80,8 +79,7 @@ std::vector<LightPeriod> collect_light_periods(std::span<const Observation> imag
     const auto frame = frames.find(image.image_file_name());
     if (frame == frames.end()) continue;
     for (const Detection& label : frame->second->detections) {
-      if (const Light* light = find_light_near_pixel(image, label.pixel))
-        add(i, *light, label.lamp);
+      if (const Light* light = find_light(image, label.pixel)) add(i, *light, label.lamp);
     }
   }
   return periods;

@@ -17,7 +17,7 @@ namespace vlp {
 /// Finds the light at the pixel (u, v) of a label. It is the nearest modulated light that is
 /// completely in view and whose center is within half its radius of `pixel`. Returns nullptr if
 /// there is none.
-const Light* find_light_near_pixel(const Observation& image, const Eigen::Vector2d& pixel);
+const Light* find_light(const Observation& image, const Eigen::Vector2d& pixel);
 
 /// Lights to which a table of labels assigns a lamp id, accumulated over folders by
 /// add_labeled_lights(). Covers only images that are not rejected; lights without a label are
@@ -34,7 +34,7 @@ void add_labeled_lights(std::span<const Observation> images, const std::vector<F
 
 /// Measured stripe period of a light, with its image and position.
 struct LightPeriod : MeasuredPeriod {
-  /// Index of the image in the input of collect_light_periods().
+  /// Index of the image in the input of collect_periods().
   std::size_t image;
   Eigen::Vector2d pixel;
   double sigma_px;
@@ -42,7 +42,7 @@ struct LightPeriod : MeasuredPeriod {
 
 /// Returns the periods of the modulated lights whose stripes are reliable (are_stripes_reliable()),
 /// also of lights that the image border cuts. If `labels` is not empty, only of labeled lights.
-std::vector<LightPeriod> collect_light_periods(std::span<const Observation> images,
-                                               const std::vector<Frame>& labels);
+std::vector<LightPeriod> collect_periods(std::span<const Observation> images,
+                                         const std::vector<Frame>& labels);
 
 }  // namespace vlp

@@ -46,7 +46,7 @@ bool is_overexposed(const Light& light, const cv::Mat& image) {
 }
 
 /// Returns true if the range of the gray levels is small (image uniformly dark or white), so that
-/// the signal may be noise. Takes a small part of the time of measure_image_signal_to_noise().
+/// the signal may be noise. Takes a small part of the time of measure_image_signal().
 bool is_image_uniform(const cv::Mat& image) {
   constexpr double max_range = 0.25;  // of the full scale
   double min = 0, max = 0;
@@ -55,16 +55,16 @@ bool is_image_uniform(const cv::Mat& image) {
 }
 
 /// Rejects an image in which nothing exceeds the noise, as too dark or overexposed.
-void reject_image_without_signal(const cv::Mat& image, Observation& result) {
-  const ImageSignal signal = measure_image_signal_to_noise(image);
+void reject_no_signal(const cv::Mat& image, Observation& result) {
+  const ImageSignal signal = measure_image_signal(image);
   if (signal.signal_to_noise < kMinSignalToNoise && signal.dark_fraction > kMaxDarkFraction) {
-    return result.set_image_rejection(
+    return result.reject(
         RejectionReason::overexposed,
         fmt::format("overexposed: all of the image is at {:.0f} % of the full scale or more",
                     100 * signal.dark_fraction));
   }
   if (signal.signal_to_noise < kMinSignalToNoise) {
-    return result.set_image_rejection(
+    return result.reject(
         RejectionReason::too_dark,
         fmt::format("too dark: the brightest is {:.0f} times the noise over the darkest, {:.0f} "
                     "wanted",
@@ -73,8 +73,8 @@ void reject_image_without_signal(const cv::Mat& image, Observation& result) {
 }
 
 /// Rejects an image with too few lamps, with the exposure as the reason if it is one.
-void reject_image_with_few_lamps(const cv::Mat& image, Observation& result) {
-  reject_image_without_signal(image, result);
+void reject_few_lamps(const cv::Mat& image, Observation& result) {
+  reject_no_signal(image, result);
   if (!result.is_image_kept()) return;
   const auto count = [&](const auto& condition) {
     return std::count_if(result.lights.begin(), result.lights.end(), condition);
@@ -86,13 +86,13 @@ void reject_image_with_few_lamps(const cv::Mat& image, Observation& result) {
   const auto unknown = count(is_kind(LightKind::unknown));
   const auto white = count([&](const Light& light) { return is_overexposed(light, image); });
   if (white > 0) {
-    return result.set_image_rejection(
+    return result.reject(
         RejectionReason::overexposed,
         fmt::format(
             "overexposed: {} of {} lights are completely at full scale, {} of the visible lamps",
             white, unknown, lamps));
   }
-  result.set_image_rejection(
+  result.reject(
       RejectionReason::too_few_lamps,
       fmt::format("too few lamps: {} visible, {} cut off by the image border, {} lights unlike any",
                   lamps, count(is_kind(LightKind::truncated)), unknown));
@@ -128,8 +128,7 @@ LampClassifier read_classifier(const LampImages& images, const fs::path& file,
   return classifier;
 }
 
-void warn_about_other_findings(std::size_t count, const char* items,
-                               std::vector<std::string>& warnings) {
+void warn_about_findings(std::size_t count, const char* items, std::vector<std::string>& warnings) {
   if (count > kMaxLines) {
     warnings.push_back(fmt::format("and {} more {}", count - kMaxLines, items));
   }
@@ -143,7 +142,7 @@ void warn_about_map(const LampImages& images, const DetectorCamera& camera,
     focal_px = images.calibration->camera.intrinsics[camera.readout == Readout::rows ? 1 : 0];
   }
   const StripeConditions conditions{*camera.row_time_s, focal_px, 0, exposure_s};
-  const auto alike = find_ambiguous_lamps(images.lamps, conditions);
+  const auto alike = list_ambiguous_lamps(images.lamps, conditions);
   for (std::size_t i = 0; i < std::min(alike.size(), kMaxLines); ++i) {
     const auto& [first, second, gap, needed] = alike[i];
     warnings.push_back(fmt::format(
@@ -153,9 +152,8 @@ void warn_about_map(const LampImages& images, const DetectorCamera& camera,
   }
   // [LAMP-11] `too near`, `too fine to be seen` | frequencies unsuitable for row time and exposure
   //   | see [frequencies](ROOM.md#lamps)
-  warn_about_other_findings(alike.size(), "pairs of lamps with frequencies that are too near",
-                            warnings);
-  const auto unreadable = find_lamps_with_unreadable_period(images.lamps, conditions);
+  warn_about_findings(alike.size(), "pairs of lamps with frequencies that are too near", warnings);
+  const auto unreadable = list_unreadable_lamps(images.lamps, conditions);
   for (std::size_t i = 0; i < std::min(unreadable.size(), kMaxLines); ++i) {
     const auto& [lamp, period_lines, periods, contrast] = unreadable[i];
     if (period_lines < kMinPeriod_lines) {
@@ -174,7 +172,7 @@ void warn_about_map(const LampImages& images, const DetectorCamera& camera,
           lamp, 100 * contrast, microseconds * *exposure_s));
     }
   }
-  warn_about_other_findings(unreadable.size(), "lamps with barely visible stripes", warnings);
+  warn_about_findings(unreadable.size(), "lamps with barely visible stripes", warnings);
 }
 
 /// Returns the pairs of lamps that have one frequency, for example "1 and 7, 2 and 8"; empty if
@@ -184,7 +182,7 @@ std::string list_shared_frequencies(const LampMap& map) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {
       const Lamp &a = map.lamps[i], &b = map.lamps[j];
-      if (are_lamps_indistinguishable(a, b)) pairs.push_back(fmt::format("{} and {}", a.id, b.id));
+      if (are_indistinguishable(a, b)) pairs.push_back(fmt::format("{} and {}", a.id, b.id));
     }
   }
   const std::size_t more = pairs.size() > kMaxLines ? pairs.size() - kMaxLines : 0;
@@ -195,7 +193,7 @@ std::string list_shared_frequencies(const LampMap& map) {
 
 /// Explains that no lamp is identified, with the reason that most of the lights have.
 std::string explain_no_lamp(const std::vector<Observation>& images, const LampMap& map) {
-  const auto count = [&](LightKind kind) { return count_lights_of_kind(images, kind); };
+  const auto count = [&](LightKind kind) { return count_lights(images, kind); };
   const auto skipped = std::count_if(images.begin(), images.end(), [](const Observation& image) {
     return !image.is_image_kept();
   });
@@ -206,7 +204,7 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
       "image's edge, {} lights flicker unlike any lamp of the map, {} are steady, {} have no form)",
       images.size(), skipped, count(LightKind::truncated), count(LightKind::unknown),
       count(LightKind::unmodulated), count(LightKind::no_outline));
-  const auto reasons = count_rejected_lights_by_reason(images);
+  const auto reasons = count_rejected_lights(images);
   if (reasons.empty()) {
     return message + ": are lamps lit and in view, and the exposure long enough?";
   }
@@ -221,7 +219,7 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
 }
 
 /// Creates the folder for annotated images.
-void create_annotate_folder(const fs::path& folder, const fs::path& images) {
+void create_folder(const fs::path& folder, const fs::path& images) {
   std::error_code error;
   fs::create_directories(folder, error);
   // [FILE-1]
@@ -239,7 +237,7 @@ LightDetector make_detector(const LampImages& images, const FrontendOptions& opt
                               : DetectorCamera{Readout::rows, options.row_time_s, {}};
   std::optional<LampClassifier> classifier;
   if (options.classifier.empty()) {
-    check_map_has_lamp_frequencies(images.lamps, images.lamps_file);
+    check_frequencies(images.lamps, images.lamps_file);
     if (!camera.row_time_s) {
       throw InputError(
           images.calibration_file,
@@ -256,8 +254,8 @@ LightDetector make_detector(const LampImages& images, const FrontendOptions& opt
     if (!known_readout) known_readout = images.calibration->camera.readout;
   }
   const std::size_t num_warnings = result.warnings.size();
-  camera.readout = estimate_readout_direction(list_lamp_images(images.images), known_readout,
-                                              options, imager_px, result);
+  camera.readout =
+      estimate_readout(list_lamp_images(images.images), known_readout, options, imager_px, result);
   // Without a calibration the readout direction is chosen per image.
   if (!images.calibration) result.warnings.resize(num_warnings);
   if (!classifier) warn_about_map(images, camera, options.exposure_s, result.warnings);
@@ -269,33 +267,31 @@ LevelRotations read_level_rotations(const LampImages& images) {
   if (!images.calibration) return {};
   CapturesTable captures = images.captures.value_or(CapturesTable());
   if (!images.captures && !is_video_file_name(images.images))
-    captures = read_captures_csv_of_folder(images.images);
+    captures = read_folder_captures(images.images);
   const bool below = images.lamps.lamps_below_camera;
   for (auto& [image, capture] : captures) {
     if (capture.inclination) capture.inclination = turn_over_if(below, *capture.inclination);
   }
-  return compute_level_rotations_of_images(captures, *images.calibration,
-                                           (below ? -1 : 1) * images.yaw_in_robot_rad);
+  return compute_level_rotations(captures, *images.calibration,
+                                 (below ? -1 : 1) * images.yaw_in_robot_rad);
 }
 
 }  // namespace
 
-Eigen::Matrix3d compute_level_rotation_from_inclination(const Inclination& inclination,
-                                                        double yaw_in_robot_rad,
-                                                        const Eigen::Matrix3d& base_from_camera) {
+Eigen::Matrix3d compute_level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
+                                       const Eigen::Matrix3d& base_from_camera) {
   const Eigen::Matrix3d level_from_base = compute_level_from_base(inclination, yaw_in_robot_rad);
   return level_rotation_from_zenith((level_from_base * base_from_camera).inverse().col(2));
 }
 
-LevelRotations compute_level_rotations_of_images(const CapturesTable& captures,
-                                                 const Calibration& calibration,
-                                                 double yaw_in_robot_rad) {
+LevelRotations compute_level_rotations(const CapturesTable& captures,
+                                       const Calibration& calibration, double yaw_in_robot_rad) {
   const Eigen::Matrix3d base_from_camera = make_detector_camera(calibration).level_from_camera;
   LevelRotations levels;
   for (const auto& [image, capture] : captures) {
     if (!capture.inclination) continue;
-    levels.emplace(image, compute_level_rotation_from_inclination(
-                              *capture.inclination, yaw_in_robot_rad, base_from_camera));
+    levels.emplace(
+        image, compute_level_rotation(*capture.inclination, yaw_in_robot_rad, base_from_camera));
   }
   return levels;
 }
@@ -315,53 +311,51 @@ LampIntake::LampIntake(const LampImages& images, ImageUse use, const FrontendOpt
       options_(options),
       can_turn_(!options.readout && !images.calibration) {
   if (images.calibration) imager_px_ = images.calibration->camera.imager_px;
-  if (!options.annotate.empty()) create_annotate_folder(options.annotate, images.images);
+  if (!options.annotate.empty()) create_folder(options.annotate, images.images);
 }
 
 Observation LampIntake::detect_lamps_in_image(const SourceImage& source) const {
   Observation result{source.file, source.time_s};
   result.readout = detector_.readout_direction();
   cv::Mat pixels;
-  read_image_and_run_detection(source, options_, imager_px_, result, [&](const cv::Mat& image) {
+  read_and_detect(source, options_, imager_px_, result, [&](const cv::Mat& image) {
     pixels = image;
-    if (min_lamps_for_image_use(use_) > 0 && is_image_uniform(image))
-      reject_image_without_signal(image, result);
+    if (min_lamps_for_use(use_) > 0 && is_image_uniform(image)) reject_no_signal(image, result);
     if (!result.is_image_kept()) return;
     const auto level = levels_.find(result.image_file_name());
     const LightDetector detector =
-        level == levels_.end() ? detector_ : detector_.copy_detector_for_camera_tilt(level->second);
+        level == levels_.end() ? detector_ : detector_.copy_for_tilt(level->second);
     if (can_turn_) {
-      auto [readout, lights] = detect_lights_with_unknown_readout(detector, to_image_view(image));
+      auto [readout, lights] = detect_both_readouts(detector, to_image_view(image));
       result.readout = readout;
       result.lights = std::move(lights);
     } else {
       result.lights = detector.detect_lights(to_image_view(image));
     }
     if (repetition_) {
-      result.lights = repetition_(result.image_file_name(), std::move(result.lights),
-                                  [&](const std::optional<Eigen::Matrix3d>& level_from_camera) {
-                                    return detector.copy_detector_for_camera_tilt(level_from_camera)
-                                        .detect_lights(to_image_view(image));
-                                  });
+      result.lights = repetition_(
+          result.image_file_name(), std::move(result.lights),
+          [&](const std::optional<Eigen::Matrix3d>& level_from_camera) {
+            return detector.copy_for_tilt(level_from_camera).detect_lights(to_image_view(image));
+          });
     }
-    if (std::cmp_less(collect_identified_lamps(result).size(), min_lamps_for_image_use(use_)))
-      reject_image_with_few_lamps(image, result);
+    if (std::cmp_less(list_identified(result).size(), min_lamps_for_use(use_)))
+      reject_few_lamps(image, result);
   });
   if (!options_.annotate.empty() && !pixels.empty()) {
-    write_annotated_image(options_.annotate, source.file,
-                          render_annotated_image(pixels, result.lights));
+    write_annotated_image(options_.annotate, source.file, annotate_image(pixels, result.lights));
   }
   for (Light& light : result.lights) std::vector<Eigen::Vector2d>().swap(light.outline);
   return result;
 }
 
-Observations LampIntake::detect_lamps_in_all_images(const std::vector<fs::path>& files,
-                                                    const IntakeProgress& progress) const {
+Observations LampIntake::detect_in_all(const std::vector<fs::path>& files,
+                                       const IntakeProgress& progress) const {
   ImageSource source(files, options_, imager_px_);
-  Observations result = collect_observations_of_images(
+  Observations result = collect_observations(
       source, options_.threads,
       [&](const SourceImage& image) { return detect_lamps_in_image(image); }, progress);
-  reject_repeated_images(result.images, use_, options_);
+  reject_repeated(result.images, use_, options_);
   const auto turned = std::count_if(
       result.images.begin(), result.images.end(),
       [&](const Observation& image) { return image.readout != detector_.readout_direction(); });
@@ -370,7 +364,7 @@ Observations LampIntake::detect_lamps_in_all_images(const std::vector<fs::path>&
                                        result.images.size(),
                                        readout_direction() == Readout::rows ? "columns" : "rows"));
   }
-  prepend_observation_messages(remarks_, result);
+  prepend_messages(remarks_, result);
   return result;
 }
 
@@ -378,34 +372,31 @@ std::vector<fs::path> list_lamp_images(const fs::path& images) {
   return is_video_file_name(images) ? std::vector{images} : list_images(images);
 }
 
-Observations detect_lamps_in_images(const LampImages& images, ImageUse use,
-                                    const FrontendOptions& options,
-                                    const IntakeProgress& progress) {
-  Observations result = LampIntake(images, use, options)
-                            .detect_lamps_in_all_images(list_lamp_images(images.images), progress);
-  check_any_lamp_identified(images, result);
+Observations detect_lamps(const LampImages& images, ImageUse use, const FrontendOptions& options,
+                          const IntakeProgress& progress) {
+  Observations result =
+      LampIntake(images, use, options).detect_in_all(list_lamp_images(images.images), progress);
+  check_any_identified(images, result);
   return result;
 }
 
-void check_any_lamp_identified(const LampImages& images, Observations& result) {
-  check_any_image_readable(images.images, result.images);
-  if (count_lights_of_kind(result.images, LightKind::lamp) == 0) {
+void check_any_identified(const LampImages& images, Observations& result) {
+  check_any_readable(images.images, result.images);
+  if (count_lights(result.images, LightKind::lamp) == 0) {
     result.failure = {false, explain_no_lamp(result.images, images.lamps)};
   } else if (std::none_of(result.images.begin(), result.images.end(),
                           [](const Observation& image) { return image.is_image_kept(); })) {
-    result.failure = {false, describe_why_no_image_is_kept(result.images)};
+    result.failure = {false, explain_no_image(result.images)};
   }
 }
 
-Readout estimate_readout_direction(const std::vector<fs::path>& images,
-                                   const std::optional<Readout>& known,
-                                   const FrontendOptions& options,
-                                   const std::optional<std::array<int, 2>>& imager_px,
-                                   Observations& result) {
+Readout estimate_readout(const std::vector<fs::path>& images, const std::optional<Readout>& known,
+                         const FrontendOptions& options,
+                         const std::optional<std::array<int, 2>>& imager_px, Observations& result) {
   if (known) return *known;
   ImageSource source(images, options, imager_px);
   cv::Mat pixels;
-  const auto found = estimate_readout_direction(source.expected_image_count(), [&](std::size_t) {
+  const auto found = estimate_readout(source.expected_image_count(), [&](std::size_t) {
     const auto image = source.read_next_image();
     pixels.release();
     try {
@@ -427,7 +418,7 @@ Readout estimate_readout_direction(const std::vector<fs::path>& images,
   return *found;
 }
 
-void check_map_has_lamp_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
+void check_frequencies(const LampMap& lamps, const fs::path& lamps_file) {
   if (std::any_of(lamps.lamps.begin(), lamps.lamps.end(),
                   [](const Lamp& lamp) { return lamp.frequency_hz.has_value(); })) {
     return;
@@ -436,8 +427,8 @@ void check_map_has_lamp_frequencies(const LampMap& lamps, const fs::path& lamps_
                    "no lamp has a frequency_hz, which is needed to identify lamps; add it");
 }
 
-void check_map_contains_captured_lamps(std::span<const Frame> frames, const LampMap& lamps,
-                                       const fs::path& lamps_file) {
+void check_map_has_lamps(std::span<const Frame> frames, const LampMap& lamps,
+                         const fs::path& lamps_file) {
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) {
       if (find_lamp_by_id(lamps.lamps, detection.lamp) != nullptr) return;

@@ -24,7 +24,7 @@
 namespace vlp {
 
 /// Rotations level_from_camera of images, by name; std::nullopt if unknown
-/// (LightDetector::copy_detector_for_camera_tilt()).
+/// (LightDetector::copy_for_tilt()).
 using LevelRotations = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 
 /// Computes the rotation level_from_camera from the inclination of a robot.
@@ -34,14 +34,12 @@ using LevelRotations = std::map<std::string, std::optional<Eigen::Matrix3d>>;
 /// @param base_from_camera  rotation by the calibrated tilt of the camera
 /// @return                  rotation with an arbitrary yaw; a detector uses only its zenith
 ///     direction
-Eigen::Matrix3d compute_level_rotation_from_inclination(const Inclination& inclination,
-                                                        double yaw_in_robot_rad,
-                                                        const Eigen::Matrix3d& base_from_camera);
+Eigen::Matrix3d compute_level_rotation(const Inclination& inclination, double yaw_in_robot_rad,
+                                       const Eigen::Matrix3d& base_from_camera);
 
 /// Returns the level rotations of the images whose inclination is in the table.
-LevelRotations compute_level_rotations_of_images(const CapturesTable& captures,
-                                                 const Calibration& calibration,
-                                                 double yaw_in_robot_rad);
+LevelRotations compute_level_rotations(const CapturesTable& captures,
+                                       const Calibration& calibration, double yaw_in_robot_rad);
 
 /// Function that detects the lights of an image in the plane that is level by a rotation;
 /// std::nullopt: by ellipses in the image.
@@ -79,7 +77,7 @@ class LampIntake {
              const std::optional<std::array<int, 2>>& imager_px, LevelRotations levels = {});
 
   /// Creates the intake of a set of images: reads the classifier and estimates the readout
-  /// direction if it is not known. detect_lamps_in_all_images() returns its notes and warnings,
+  /// direction if it is not known. detect_in_all() returns its notes and warnings,
   /// too.
   /// @throws InputError if the row time, the frequencies or images are missing, or if captures.csv
   ///     cannot be read; also if the classifier is for other lamps or another row time
@@ -96,8 +94,8 @@ class LampIntake {
 
   /// Applies detect_lamps_in_image() to all images and video frames. Returns one observation per
   /// image, in order.
-  Observations detect_lamps_in_all_images(const std::vector<std::filesystem::path>& files,
-                                          const IntakeProgress& progress = {}) const;
+  Observations detect_in_all(const std::vector<std::filesystem::path>& files,
+                             const IntakeProgress& progress = {}) const;
 
   Readout readout_direction() const { return detector_.readout_direction(); }
 
@@ -111,7 +109,7 @@ class LampIntake {
   std::optional<std::array<int, 2>> imager_px_;
   DetectionRepetition repetition_;
   /// True if an image may be read out in the other direction
-  /// (detect_lights_with_unknown_readout()).
+  /// (detect_both_readouts()).
   bool can_turn_ = false;
 };
 
@@ -122,29 +120,26 @@ std::vector<std::filesystem::path> list_lamp_images(const std::filesystem::path&
 /// of lamps in the map that are hard to distinguish. Sets Observations::failure if no lamp is
 /// identified or no image can be used.
 /// @throws InputError as LampIntake, and if no image can be read
-Observations detect_lamps_in_images(const LampImages& images, ImageUse use,
-                                    const FrontendOptions& options,
-                                    const IntakeProgress& progress = {});
+Observations detect_lamps(const LampImages& images, ImageUse use, const FrontendOptions& options,
+                          const IntakeProgress& progress = {});
 
 /// Sets Observations::failure if no lamp is identified in any image, or no image is kept.
 /// @throws InputError if no image can be read
-void check_any_lamp_identified(const LampImages& images, Observations& result);
+void check_any_identified(const LampImages& images, Observations& result);
 
 /// Estimates the readout direction from images unless it is known. Adds a note to `result`, or a
 /// warning if the images do not determine it and rows are assumed.
-Readout estimate_readout_direction(const std::vector<std::filesystem::path>& images,
-                                   const std::optional<Readout>& known,
-                                   const FrontendOptions& options,
-                                   const std::optional<std::array<int, 2>>& imager_px,
-                                   Observations& result);
+Readout estimate_readout(const std::vector<std::filesystem::path>& images,
+                         const std::optional<Readout>& known, const FrontendOptions& options,
+                         const std::optional<std::array<int, 2>>& imager_px, Observations& result);
 
 /// Checks the frequencies of a lamp map.
 /// @throws InputError if no lamp has a frequency
-void check_map_has_lamp_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);
+void check_frequencies(const LampMap& lamps, const std::filesystem::path& lamps_file);
 
 /// Checks that a lamp map belongs to captures.
 /// @throws InputError if the map has none of the lamps in the captures
-void check_map_contains_captured_lamps(std::span<const Frame> frames, const LampMap& lamps,
-                                       const std::filesystem::path& lamps_file);
+void check_map_has_lamps(std::span<const Frame> frames, const LampMap& lamps,
+                         const std::filesystem::path& lamps_file);
 
 }  // namespace vlp

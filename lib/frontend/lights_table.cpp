@@ -43,7 +43,7 @@ std::string lamp_name(const Light& light) { return light.lamp ? std::to_string(*
 
 }  // namespace
 
-int count_lights_of_kind(std::span<const Observation> images, LightKind kind) {
+int count_lights(std::span<const Observation> images, LightKind kind) {
   std::ptrdiff_t count = 0;
   for (const Observation& image : images) {
     count += std::count_if(image.lights.begin(), image.lights.end(),
@@ -52,7 +52,7 @@ int count_lights_of_kind(std::span<const Observation> images, LightKind kind) {
   return static_cast<int>(count);
 }
 
-std::vector<CountedReason> count_rejected_lights_by_reason(std::span<const Observation> images) {
+std::vector<CountedReason> count_rejected_lights(std::span<const Observation> images) {
   std::map<std::pair<LightKind, LightReason>, int> counts;
   for (const Observation& image : images) {
     for (const Light& light : image.lights) {
@@ -243,7 +243,7 @@ void draw_label(cv::Mat& annotated_image, const Light& light, double size) {
 
 }  // namespace
 
-cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& lights) {
+cv::Mat annotate_image(const cv::Mat& image, const std::vector<Light>& lights) {
   cv::Mat annotated_image = brighten_image(image);
   const double size = std::max(1.0, annotated_image.cols / 1000.0);  // of letters and crosses
   const int thickness = static_cast<int>(std::lround(size));

@@ -16,7 +16,7 @@
 namespace vlp {
 
 /// Returns the number of lights of this kind in all images.
-int count_lights_of_kind(std::span<const Observation> images, LightKind kind);
+int count_lights(std::span<const Observation> images, LightKind kind);
 
 /// Number of lights, over all images, that have this kind and this reason.
 struct CountedReason {
@@ -27,7 +27,7 @@ struct CountedReason {
 
 /// Counts the lights that are no lamps, per kind and reason. The most frequent reason comes first.
 /// Lights without outline come last, because they are rarely lamps.
-std::vector<CountedReason> count_rejected_lights_by_reason(std::span<const Observation> images);
+std::vector<CountedReason> count_rejected_lights(std::span<const Observation> images);
 
 /// Returns the enumerator as a word, for example "steady" and "too_few_periods".
 std::string_view light_kind_name(LightKind kind);
@@ -52,7 +52,7 @@ void write_lights_table(const std::filesystem::path& file, std::span<const Obser
 /// yellow, unknown ones red, unmodulated ones blue, and lights without outline gray.
 ///
 /// @param image  one channel of 8 or 16 bits
-cv::Mat render_annotated_image(const cv::Mat& image, const std::vector<Light>& lights);
+cv::Mat annotate_image(const cv::Mat& image, const std::vector<Light>& lights);
 
 /// Writes an annotated image atomically as PNG into `folder`, named like the image with `.png`
 /// appended.

@@ -49,31 +49,29 @@ constexpr std::array kReasons{
     ReasonText{RejectionReason::not_needed, "not needed"},
     ReasonText{RejectionReason::used_elsewhere, "used elsewhere"}};
 
-const ReasonText& find_text(RejectionReason reason) {
+const ReasonText& get_text(RejectionReason reason) {
   return *std::ranges::find(kReasons, reason, &ReasonText::reason);
 }
 
 }  // namespace
 
-std::string_view rejection_reason_phrase(RejectionReason reason) {
-  return find_text(reason).phrase;
-}
+std::string_view reason_phrase(RejectionReason reason) { return get_text(reason).phrase; }
 
 bool is_redundancy_rejection(RejectionReason reason) {
   return reason == RejectionReason::same_image || reason == RejectionReason::same_view ||
          reason == RejectionReason::not_needed;
 }
 
-void prepend_observation_messages(const Observations& remarks, Observations& result) {
+void prepend_messages(const Observations& remarks, Observations& result) {
   result.warnings.insert(result.warnings.begin(), remarks.warnings.begin(), remarks.warnings.end());
   result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
 }
 
-std::vector<Detection> collect_identified_lamps(const Observation& image) {
+std::vector<Detection> list_identified(const Observation& image) {
   return select_lamps(image.lights);
 }
 
-std::vector<BoardView> collect_board_views_of_kept_images(std::span<const Observation> images) {
+std::vector<BoardView> collect_board_views(std::span<const Observation> images) {
   std::vector<BoardView> views;
   for (const Observation& image : images) {
     if (image.is_image_kept() && image.board) views.push_back(*image.board);
@@ -81,16 +79,15 @@ std::vector<BoardView> collect_board_views_of_kept_images(std::span<const Observ
   return views;
 }
 
-std::vector<Frame> collect_lamp_frames_of_kept_images(std::span<const Observation> images) {
+std::vector<Frame> collect_lamp_frames(std::span<const Observation> images) {
   std::vector<Frame> frames;
   for (const Observation& image : images) {
-    if (image.is_image_kept())
-      frames.push_back({image.image_file_name(), collect_identified_lamps(image)});
+    if (image.is_image_kept()) frames.push_back({image.image_file_name(), list_identified(image)});
   }
   return frames;
 }
 
-std::string summarize_image_rejections(std::span<const Observation> images) {
+std::string summarize_rejected_images(std::span<const Observation> images) {
   std::map<std::pair<RejectionReason, std::string>, int> counts;
   std::map<std::pair<RejectionReason, std::string>, std::string> remedies;
   int rejected = 0;
@@ -100,9 +97,9 @@ std::string summarize_image_rejections(std::span<const Observation> images) {
     // The message names the run of the image; the text after the colon is the remedy.
     const bool has_owner = reason == RejectionReason::used_elsewhere;
     const auto colon = std::min(message.find(':'), message.size());
-    const std::pair key(
-        reason, has_owner ? message.substr(0, colon) : rejection_reason_phrase(reason).data());
-    remedies[key] = has_owner ? message.substr(colon) : find_text(reason).remedy;
+    const std::pair key(reason,
+                        has_owner ? message.substr(0, colon) : reason_phrase(reason).data());
+    remedies[key] = has_owner ? message.substr(colon) : get_text(reason).remedy;
     ++counts[key];
     ++rejected;
   }
@@ -114,13 +111,12 @@ std::string summarize_image_rejections(std::span<const Observation> images) {
   return text.append(remedy);
 }
 
-std::string describe_why_no_image_is_kept(std::span<const Observation> images) {
+std::string explain_no_image(std::span<const Observation> images) {
   return fmt::format("none of the {} images can be used: {}", images.size(),
-                     summarize_image_rejections(images));
+                     summarize_rejected_images(images));
 }
 
-void check_any_image_readable(const std::filesystem::path& where,
-                              std::span<const Observation> images) {
+void check_any_readable(const std::filesystem::path& where, std::span<const Observation> images) {
   const auto is_readable = [](const Observation& image) {
     return image.is_image_kept() || (image.rejection->reason != RejectionReason::unreadable &&
                                      image.rejection->reason != RejectionReason::wrong_size);
@@ -134,29 +130,27 @@ void check_any_image_readable(const std::filesystem::path& where,
   throw InputError(where, message);
 }
 
-void read_image_and_run_detection(const SourceImage& source, const FrontendOptions& options,
-                                  const std::optional<std::array<int, 2>>& imager_px,
-                                  Observation& result,
-                                  const std::function<void(const cv::Mat&)>& detect) {
+void read_and_detect(const SourceImage& source, const FrontendOptions& options,
+                     const std::optional<std::array<int, 2>>& imager_px, Observation& result,
+                     const std::function<void(const cv::Mat&)>& detect) {
   RejectionReason reason = RejectionReason::unreadable;
   try {
     const cv::Mat image = source.read_gray_image(options);
     result.size_px = {image.cols, image.rows};
     reason = RejectionReason::wrong_size;
-    check_image_size_matches_imager(source.file, result.size_px, imager_px);
+    check_image_size(source.file, result.size_px, imager_px);
     reason = RejectionReason::unreadable;
     detect(image);
   } catch (const InputError& error) {
-    result.set_image_rejection(reason, make_one_line_message(source.file, error));
+    result.reject(reason, make_one_line_message(source.file, error));
   } catch (const std::exception& error) {
-    result.set_image_rejection(reason,
-                               "cannot be used: " + make_one_line_message(source.file, error));
+    result.reject(reason, "cannot be used: " + make_one_line_message(source.file, error));
   }
 }
 
-Observations collect_observations_of_images(
-    ImageSource& source, int threads, const std::function<Observation(const SourceImage&)>& observe,
-    const IntakeProgress& progress) {
+Observations collect_observations(ImageSource& source, int threads,
+                                  const std::function<Observation(const SourceImage&)>& observe,
+                                  const IntakeProgress& progress) {
   Observations result;
   std::mutex counting;
   std::size_t done = 0;
@@ -178,7 +172,7 @@ namespace {
 std::vector<PointDetection> get_points_in(const Observation& image) {
   if (image.board) return collect_detected_corners(image.board->detection);
   std::vector<PointDetection> points;
-  for (const Detection& lamp : collect_identified_lamps(image)) {
+  for (const Detection& lamp : list_identified(image)) {
     points.push_back({static_cast<std::size_t>(lamp.lamp), lamp.pixel});
   }
   std::sort(points.begin(), points.end(),
@@ -211,11 +205,11 @@ bool are_points_close(const std::vector<PointDetection>& a, const std::vector<Po
 
 }  // namespace
 
-int min_lamps_for_image_use(ImageUse use) {
+int min_lamps_for_use(ImageUse use) {
   return use == ImageUse::rotation || use == ImageUse::known_positions ? 2 : 0;
 }
 
-void Selection::add_image_or_reject_as_repeated(Observation& image) {
+void Selection::add_or_reject(Observation& image) {
   if (!image.is_image_kept() || use_ == ImageUse::fixes) return;
   std::vector<PointDetection> points = get_points_in(image);
   if (points.empty()) return;
@@ -223,14 +217,13 @@ void Selection::add_image_or_reject_as_repeated(Observation& image) {
     if (!are_points_equal(points, kept.points)) continue;
     // [FILE-10] `the same image`, `the same view` | copy, or view within 1 % of the image width of
     //   another | move the board, or rotate the camera
-    return image.set_image_rejection(RejectionReason::same_image,
-                                     "is the same image as " + kept.name);
+    return image.reject(RejectionReason::same_image, "is the same image as " + kept.name);
   }
   if (use_ != ImageUse::known_positions) {
     for (const Kept& kept : kept_) {
       if (!are_points_close(points, kept.points, same_view_fraction_ * image.size_px[0])) continue;
-      return image.set_image_rejection(
-          RejectionReason::same_view, "shows the same view as " + kept.name + ": views count once");
+      return image.reject(RejectionReason::same_view,
+                          "shows the same view as " + kept.name + ": views count once");
     }
   }
   kept_.push_back({image.image_file_name(), std::move(points)});
@@ -240,10 +233,10 @@ void Selection::add_kept_image(const Observation& image) {
   if (use_ != ImageUse::fixes) kept_.push_back({image.image_file_name(), get_points_in(image)});
 }
 
-void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
-                            const FrontendOptions& options) {
+void reject_repeated(std::vector<Observation>& images, ImageUse use,
+                     const FrontendOptions& options) {
   Selection selection(use, options);
-  for (Observation& image : images) selection.add_image_or_reject_as_repeated(image);
+  for (Observation& image : images) selection.add_or_reject(image);
 }
 
 }  // namespace vlp

@@ -42,7 +42,7 @@ enum class RejectionReason {
 
 /// Returns a phrase for a message that follows a number of images: "blurred" for "10 blurred",
 /// "cannot be read", ...
-std::string_view rejection_reason_phrase(RejectionReason reason);
+std::string_view reason_phrase(RejectionReason reason);
 
 /// Returns true if the image has no fault, but other images make it unnecessary.
 bool is_redundancy_rejection(RejectionReason reason);
@@ -56,7 +56,7 @@ struct Rejection {
 
 /// Result of the intake of one image: its detections, and the rejection if it is not used.
 struct Observation {
-  /// Image file, or make_video_frame_name() (VIDEO#000123) for a frame of a video.
+  /// Image file, or make_frame_name() (VIDEO#000123) for a frame of a video.
   std::filesystem::path file;
   /// Time of a video's frame since the start of the video; std::nullopt for image files.
   std::optional<double> time_s = {};
@@ -79,7 +79,7 @@ struct Observation {
 
   bool is_image_kept() const { return !rejection; }
   std::string image_file_name() const { return file.filename().string(); }
-  void set_image_rejection(RejectionReason reason, std::string message) {
+  void reject(RejectionReason reason, std::string message) {
     rejection = Rejection{reason, std::move(message)};
   }
 };
@@ -102,36 +102,34 @@ struct Observations {
 };
 
 /// Inserts the messages of `remarks` before those of `result`.
-void prepend_observation_messages(const Observations& remarks, Observations& result);
+void prepend_messages(const Observations& remarks, Observations& result);
 
 /// Returns a detection for each light of kind `lamp`: id, pixel of the center, and its standard
 /// deviation.
-std::vector<Detection> collect_identified_lamps(const Observation& image);
+std::vector<Detection> list_identified(const Observation& image);
 
 /// Returns the detections of the board in the images that are used, in their order.
-std::vector<BoardView> collect_board_views_of_kept_images(std::span<const Observation> images);
+std::vector<BoardView> collect_board_views(std::span<const Observation> images);
 
 /// Returns the lamps in the images that are used, one frame per image.
-std::vector<Frame> collect_lamp_frames_of_kept_images(std::span<const Observation> images);
+std::vector<Frame> collect_lamp_frames(std::span<const Observation> images);
 
 /// Returns the number of rejected images per reason, for example "10 blurred, 2 too dark". Appends
 /// the remedy if one reason applies to more than half of them. Empty if no image is rejected.
-std::string summarize_image_rejections(std::span<const Observation> images);
+std::string summarize_rejected_images(std::span<const Observation> images);
 
 /// Describes that none of the images can be used, with their number per reason.
-std::string describe_why_no_image_is_kept(std::span<const Observation> images);
+std::string explain_no_image(std::span<const Observation> images);
 
 /// Checks that at least one image can be read.
 /// @throws InputError with the reason of the first image if none can be read
-void check_any_image_readable(const std::filesystem::path& where,
-                              std::span<const Observation> images);
+void check_any_readable(const std::filesystem::path& where, std::span<const Observation> images);
 
 /// Reads an image and passes its pixels to `detect`. Rejects the image, with the reason, if it
 /// cannot be read, is not of `imager_px`, or makes `detect` throw an exception.
-void read_image_and_run_detection(const SourceImage& source, const FrontendOptions& options,
-                                  const std::optional<std::array<int, 2>>& imager_px,
-                                  Observation& result,
-                                  const std::function<void(const cv::Mat&)>& detect);
+void read_and_detect(const SourceImage& source, const FrontendOptions& options,
+                     const std::optional<std::array<int, 2>>& imager_px, Observation& result,
+                     const std::function<void(const cv::Mat&)>& detect);
 
 /// Callback with the number of images done and their total, as far as the headers of videos report
 /// it. Calls do not overlap.
@@ -139,9 +137,9 @@ using IntakeProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Calls `observe` for each image of the source on several threads and returns the results in the
 /// order of the images. An image that cannot be used does not end the run.
-Observations collect_observations_of_images(
-    ImageSource& source, int threads, const std::function<Observation(const SourceImage&)>& observe,
-    const IntakeProgress& progress = {});
+Observations collect_observations(ImageSource& source, int threads,
+                                  const std::function<Observation(const SourceImage&)>& observe,
+                                  const IntakeProgress& progress = {});
 
 /// Use of a set of images, which determines the reasons for a rejection.
 enum class ImageUse {
@@ -161,7 +159,7 @@ class Selection {
 
   /// Rejects the image if it repeats one that was added or kept before. Does not change images that
   /// are already rejected or have no corners or lamps.
-  void add_image_or_reject_as_repeated(Observation& image);
+  void add_or_reject(Observation& image);
 
   /// Adds an image that is used anyway. Later images that repeat it are rejected.
   void add_kept_image(const Observation& image);
@@ -177,10 +175,10 @@ class Selection {
 };
 
 /// Rejects images that repeat an earlier one, by a Selection, in the order of `images`.
-void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
-                            const FrontendOptions& options);
+void reject_repeated(std::vector<Observation>& images, ImageUse use,
+                     const FrontendOptions& options);
 
 /// Returns the minimum number of lamps that an image needs.
-int min_lamps_for_image_use(ImageUse use);
+int min_lamps_for_use(ImageUse use);
 
 }  // namespace vlp

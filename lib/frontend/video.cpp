@@ -23,11 +23,11 @@ bool is_video_file_name(const std::filesystem::path& file) {
                             {".avi", ".mp4", ".m4v", ".mov", ".mkv", ".webm", ".mpg", ".mpeg"});
 }
 
-std::string make_video_frame_name(const std::string& video, std::size_t number) {
+std::string make_frame_name(const std::string& video, std::size_t number) {
   return fmt::format("{}#{:06}", video, number);
 }
 
-std::optional<std::string> parse_video_name_from_frame_name(const std::string& name) {
+std::optional<std::string> parse_video_name(const std::string& name) {
   const auto mark = name.rfind('#');
   if (mark == std::string::npos || mark + 1 == name.size() ||
       name.find_first_not_of("0123456789", mark + 1) != std::string::npos ||
@@ -131,7 +131,7 @@ std::optional<VideoFrame> Video::read_next_frame() {
 
 void Video::skip_video_frame() { grab_frame(); }
 
-std::string Video::describe_missing_frames() const {
+std::string Video::describe_missing() const {
   const std::size_t reported = reported_frame_count();
   // Other formats only estimate the number of frames from their duration.
   const std::string kind = std::filesystem::path(source_).extension().string();

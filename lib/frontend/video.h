@@ -17,10 +17,10 @@ bool is_video_file_name(const std::filesystem::path& file);
 /// Returns the name of a video frame, which replaces the name of an image file: VIDEO#000123.
 /// @param video   name of the video
 /// @param number  index of the frame from 0, among the frames that can be decoded
-std::string make_video_frame_name(const std::string& video, std::size_t number);
+std::string make_frame_name(const std::string& video, std::size_t number);
 
 /// Parses the name of a frame, VIDEO#000123, and returns VIDEO; std::nullopt for other names.
-std::optional<std::string> parse_video_name_from_frame_name(const std::string& name);
+std::optional<std::string> parse_video_name(const std::string& name);
 
 /// Decoded frame of a video.
 struct VideoFrame {
@@ -55,7 +55,7 @@ class Video {
   std::size_t reported_frame_count() const;
   /// Describes missing frames in one line without the file name; empty if there are none.
   /// @pre The end of the video has been reached.
-  std::string describe_missing_frames() const;
+  std::string describe_missing() const;
 
  private:
   bool grab_frame();

@@ -37,8 +37,7 @@ Circle circle_through(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
 }
 
 /// Returns the smallest circle that contains `points` and has both `a` and `b` on its rim.
-Circle smallest_circle_through_two(Points points, const Eigen::Vector2d& a,
-                                   const Eigen::Vector2d& b) {
+Circle circle_through_two(Points points, const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
   Circle circle = circle_of_diameter(a, b);
   for (const auto& point : points) {
     if (!contains(circle, point)) circle = circle_through(a, b, point);
@@ -46,23 +45,21 @@ Circle smallest_circle_through_two(Points points, const Eigen::Vector2d& a,
   return circle;
 }
 
-Circle smallest_circle_through_one(Points points, const Eigen::Vector2d& a) {
+Circle circle_through_one(Points points, const Eigen::Vector2d& a) {
   Circle circle{a, 0};
   for (std::size_t i = 0; i < points.size(); ++i) {
-    if (!contains(circle, points[i]))
-      circle = smallest_circle_through_two(points.first(i), a, points[i]);
+    if (!contains(circle, points[i])) circle = circle_through_two(points.first(i), a, points[i]);
   }
   return circle;
 }
 
 }  // namespace
 
-Circle compute_enclosing_circle(Points points) {
+Circle enclose_in_circle(Points points) {
   assert(!points.empty());
   Circle circle{points.front(), 0};
   for (std::size_t i = 1; i < points.size(); ++i) {
-    if (!contains(circle, points[i]))
-      circle = smallest_circle_through_one(points.first(i), points[i]);
+    if (!contains(circle, points[i])) circle = circle_through_one(points.first(i), points[i]);
   }
   return circle;
 }

@@ -15,6 +15,6 @@ namespace vlp {
 ///
 /// Adds the points one by one (Welzl 1991): the next point lies in the circle of the previous
 /// points, or on the rim of the new circle.
-Circle compute_enclosing_circle(std::span<const Eigen::Vector2d> points);
+Circle enclose_in_circle(std::span<const Eigen::Vector2d> points);
 
 }  // namespace vlp

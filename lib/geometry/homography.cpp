@@ -42,7 +42,7 @@ Eigen::Matrix3d estimate_homography(std::span<const PlanePair> pairs) {
     squares += rows.transpose() * rows;
   }
   const Eigen::Matrix<double, 9, 1> smallest =
-      eigendecompose_symmetric_matrix(Eigen::MatrixXd(squares)).vectors.col(0);
+      eigendecompose(Eigen::MatrixXd(squares)).vectors.col(0);
   const Eigen::Matrix3d fitted =
       Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(smallest.data());
   return to_normal.inverse() * fitted * from_normal;

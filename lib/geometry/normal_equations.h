@@ -64,7 +64,7 @@ struct Cholesky {
   }
 
   /// Solves A y = x and returns y.
-  std::array<double, n> solve_normal_equations(std::array<double, n> x) const {
+  std::array<double, n> solve_system(std::array<double, n> x) const {
     for (std::size_t i = 0; i < n; ++i) {
       for (std::size_t k = 0; k < i; ++k) x[i] -= lower[i][k] * x[k];
       x[i] *= inverse_diagonal[i];
@@ -80,7 +80,7 @@ struct Cholesky {
   std::array<double, n> compute_inverse_column(std::size_t i) const {
     std::array<double, n> unit{};
     unit[i] = 1;
-    return solve_normal_equations(unit);
+    return solve_system(unit);
   }
 };
 

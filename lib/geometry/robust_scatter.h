@@ -26,7 +26,7 @@ namespace vlp {
 /// @param squares             squared lengths of the residuals, not empty, in any unit squared
 /// @param degrees_of_freedom  number of coordinates minus number of unknowns; at least 1 is assumed
 /// @return                    variance per axis, in the unit of `squares`
-inline double estimate_robust_variance_2d(std::vector<double> squares, double degrees_of_freedom) {
+inline double estimate_variance_2d(std::vector<double> squares, double degrees_of_freedom) {
   assert(!squares.empty());
   constexpr double median_of_unit_variance = 2 * std::numbers::ln2;
   const double rows = 2 * static_cast<double>(squares.size());
@@ -34,12 +34,12 @@ inline double estimate_robust_variance_2d(std::vector<double> squares, double de
          std::max(degrees_of_freedom, 1.0);
 }
 
-/// Computes the outlier bound of squared lengths, in units of estimate_robust_variance_2d(). Normal
+/// Computes the outlier bound of squared lengths, in units of estimate_variance_2d(). Normal
 /// residuals exceed it as rarely as they exceed sigmas^2 if the variance is known.
 ///
 /// Half the quotient is F(2, m), and the quotient exceeds x with the probability
 /// (1 + x / m)^(-m / 2): x = m (exp(sigmas^2 / m) - 1).
-inline double compute_squared_outlier_bound_2d(double sigmas, double degrees_of_freedom) {
+inline double compute_outlier_bound_2d(double sigmas, double degrees_of_freedom) {
   constexpr double m_per_row = std::numbers::ln2 * std::numbers::ln2;
   const double m = m_per_row * std::max(degrees_of_freedom, 1.0);
   return m * std::expm1(sigmas * sigmas / m);

@@ -22,7 +22,7 @@ inline constexpr double kSigmasOfOneInTenThousand = 3.719;
 ///   m (exp((sigmas (8 m + 3) / (8 m + 1))^2 / m) - 1)
 /// Source: Wallace, Bounds on normal approximations to Student's and the chi-square distributions
 /// (1959).
-inline double compute_squared_student_t_bound(double sigmas, double m) {
+inline double compute_squared_t_bound(double sigmas, double m) {
   const double z = sigmas * (8 * m + 3) / (8 * m + 1);
   return m * std::expm1(z * z / m);
 }
@@ -32,7 +32,7 @@ inline double compute_squared_student_t_bound(double sigmas, double m) {
 /// variable.
 inline double compute_student_factor(double m) {
   constexpr double sigmas_of_95_percent = 1.96;
-  return compute_squared_student_t_bound(sigmas_of_95_percent, m) /
+  return compute_squared_t_bound(sigmas_of_95_percent, m) /
          (sigmas_of_95_percent * sigmas_of_95_percent);
 }
 

@@ -20,15 +20,13 @@ SymmetricEigen<N> decompose(const Eigen::Matrix<double, N, N>& matrix) {
 
 }  // namespace
 
-SymmetricEigen<2> eigendecompose_symmetric_matrix(const Eigen::Matrix2d& matrix) {
+SymmetricEigen<2> eigendecompose(const Eigen::Matrix2d& matrix) { return decompose(matrix); }
+
+SymmetricEigen<Eigen::Dynamic> eigendecompose(const Eigen::MatrixXd& matrix) {
   return decompose(matrix);
 }
 
-SymmetricEigen<Eigen::Dynamic> eigendecompose_symmetric_matrix(const Eigen::MatrixXd& matrix) {
-  return decompose(matrix);
-}
-
-std::optional<Eigen::Matrix4d> invert_positive_definite_matrix(const Eigen::Matrix4d& matrix) {
+std::optional<Eigen::Matrix4d> invert_positive_definite(const Eigen::Matrix4d& matrix) {
   const Eigen::LLT<Eigen::Matrix4d> factor(matrix);
   if (factor.info() != Eigen::Success) return std::nullopt;
   const Eigen::Matrix4d inverse = factor.solve(Eigen::Matrix4d::Identity());
@@ -36,7 +34,7 @@ std::optional<Eigen::Matrix4d> invert_positive_definite_matrix(const Eigen::Matr
   return inverse;
 }
 
-Eigen::MatrixXd solve_symmetric_system(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
   return a.ldlt().solve(b);
 }
 

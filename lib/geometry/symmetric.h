@@ -19,14 +19,14 @@ struct SymmetricEigen {
 };
 
 /// Computes the eigendecomposition of a symmetric matrix. Reads its lower triangle only.
-SymmetricEigen<2> eigendecompose_symmetric_matrix(const Eigen::Matrix2d& matrix);
-SymmetricEigen<Eigen::Dynamic> eigendecompose_symmetric_matrix(const Eigen::MatrixXd& matrix);
+SymmetricEigen<2> eigendecompose(const Eigen::Matrix2d& matrix);
+SymmetricEigen<Eigen::Dynamic> eigendecompose(const Eigen::MatrixXd& matrix);
 
 /// Computes the inverse of a positive definite matrix, such as one of normal equations. Returns
 /// std::nullopt if the matrix is not positive definite or its inverse is not finite.
-std::optional<Eigen::Matrix4d> invert_positive_definite_matrix(const Eigen::Matrix4d& matrix);
+std::optional<Eigen::Matrix4d> invert_positive_definite(const Eigen::Matrix4d& matrix);
 
 /// Solves A X = B for a symmetric matrix A, by LDL^T. Returns X.
-Eigen::MatrixXd solve_symmetric_system(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
+Eigen::MatrixXd solve_symmetric(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
 }  // namespace vlp

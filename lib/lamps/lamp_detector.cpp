@@ -58,8 +58,7 @@ std::vector<Detection> LampDetector::detect_lamps(const ImageView& image) const 
 std::vector<Detection> LampDetector::detect_lamps(
     const ImageView& image, const std::optional<Eigen::Matrix3d>& level_from_camera) const {
   check(image, size_);
-  return select_lamps(
-      detector_->copy_detector_for_camera_tilt(level_from_camera).detect_lights(image));
+  return select_lamps(detector_->copy_for_tilt(level_from_camera).detect_lights(image));
 }
 
 }  // namespace vlp

@@ -80,11 +80,11 @@ double compute_clipped_fraction(const ImageView& lines, const Eigen::Vector2d& l
 }
 
 /// Adds the error of an unknown lens to the sigma of the lights. Must be called last, because
-/// keep_best_light_of_lamp() compares sigmas without this error.
-void add_error_of_unknown_lens(const ImageSize& size, std::vector<MeasuredLight>& lights) {
+/// keep_best_light() compares sigmas without this error.
+void add_lens_error(const ImageSize& size, std::vector<MeasuredLight>& lights) {
   for (MeasuredLight& light : lights) {
     if (light.kind == LightKind::no_outline) continue;
-    add_error_to_center_sigma(predict_center_sd_without_lens_px(light, size), light);
+    add_center_error(sd_without_lens_px(light, size), light);
   }
 }
 
@@ -104,7 +104,7 @@ bool are_at_same_position(const Light& a, const Light& b) {
 }
 
 /// Returns the reason why a light is steady; std::nullopt if it is modulated.
-std::optional<LightReason> find_reason_for_steady_light(const Stripes& stripes) {
+std::optional<LightReason> find_steady_reason(const Stripes& stripes) {
   constexpr double min_clarity = 0.5;
   if (!(stripes.contrast >= kMinContrast)) return LightReason::unmodulated;
   if (!(stripes.periods >= kMinPeriods)) return LightReason::too_few_periods;
@@ -144,8 +144,7 @@ int count_pixels(const Blob& blob) {
 
 /// Returns the lit pixels of a light: the blob with most lit pixels in its box, or the runs near
 /// its box if there are several blobs or if the blob is larger.
-Blob find_lit_pixels_of_light(const PixelBox& box, std::span<const Blob> blobs,
-                              const ImageSize& size) {
+Blob collect_lit_pixels(const PixelBox& box, std::span<const Blob> blobs, const ImageSize& size) {
   constexpr double min_fraction = 0.8, max_area_ratio = 1.4;
   const Blob* best = nullptr;
   int most = 0, total = 0;
@@ -160,11 +159,11 @@ Blob find_lit_pixels_of_light(const PixelBox& box, std::span<const Blob> blobs,
   return clip(blobs, expand_and_clip_box(box, std::max(box.width, box.height) / 4, size));
 }
 
-MeasuredLight make_light_without_outline(const PixelBox& box, const LightShape& shape) {
+MeasuredLight make_plain_light(const PixelBox& box, const LightShape& shape) {
   MeasuredLight light{};
   light.reason = LightReason::unknown_period;
-  light.box = {shape.swap_image_and_scanline_axes({box.x - 0.5, box.y - 0.5}),
-               shape.swap_image_and_scanline_axes({box.end_column() - 0.5, box.end_row() - 0.5})};
+  light.box = {shape.swap_axes({box.x - 0.5, box.y - 0.5}),
+               shape.swap_axes({box.end_column() - 0.5, box.end_row() - 0.5})};
   light.pixel = light.box.center();
   light.radius_px = light.box.sizes().mean() / 2;
   light.inlier_fraction = 1;
@@ -176,8 +175,8 @@ MeasuredLight make_light_without_outline(const PixelBox& box, const LightShape& 
 MeasuredLight make_light_from_modulation(const ModulatedLight& found,
                                          std::optional<MeasuredLight> outline,
                                          const LightShape& shape) {
-  MeasuredLight light = make_light_without_outline(found.box, shape);
-  light.pixel = shape.swap_image_and_scanline_axes(found.center);
+  MeasuredLight light = make_plain_light(found.box, shape);
+  light.pixel = shape.swap_axes(found.center);
   light.sigma_px = std::clamp(found.center_sd_px, kMinSigma_px, kMaxSigma_px);
   light.radius_px = found.radius_px;
   light.rise_px = found.radius_px / 2;
@@ -206,7 +205,7 @@ bool is_box_inside_image(const PixelBox& box, const ImageSize& size) {
 }
 
 /// Merges boxes that overlap, until none do.
-std::vector<PixelBox> merge_overlapping_boxes(std::vector<PixelBox> boxes) {
+std::vector<PixelBox> merge_boxes(std::vector<PixelBox> boxes) {
   for (std::size_t i = 0; i < boxes.size(); ++i) {
     for (std::size_t j = 0; j < boxes.size(); ++j) {
       if (j == i || intersect_boxes(boxes[i], boxes[j]).area_px() == 0) continue;
@@ -268,7 +267,7 @@ LightDetector::LightDetector(const LampMap& lamps, const DetectorCamera& camera,
   }
 }
 
-LightDetector LightDetector::copy_detector_for_camera_tilt(
+LightDetector LightDetector::copy_for_tilt(
     const std::optional<Eigen::Matrix3d>& level_from_camera) const {
   DetectorCamera camera = camera_;
   if (level_from_camera) {
@@ -279,13 +278,13 @@ LightDetector LightDetector::copy_detector_for_camera_tilt(
   return {lamps_, camera, classifier_};
 }
 
-LightDetector LightDetector::copy_detector_with_readout_direction(Readout readout) const {
+LightDetector LightDetector::copy_with_readout(Readout readout) const {
   DetectorCamera camera = camera_;
   camera.readout = readout;
   return {lamps_, camera, classifier_};
 }
 
-std::vector<PixelBox> LightDetector::find_search_boxes(const std::vector<Blob>& blobs,
+std::vector<PixelBox> LightDetector::list_search_boxes(const std::vector<Blob>& blobs,
                                                        const ImageSize& size) const {
   std::vector<PixelBox> boxes;
   for (const Blob& blob : blobs) {
@@ -294,7 +293,7 @@ std::vector<PixelBox> LightDetector::find_search_boxes(const std::vector<Blob>& 
     const int margin_px = std::max(std::max(box.width, box.height) / 2, max_dark_rows_);
     boxes.push_back(expand_and_clip_box(box, margin_px, size));
   }
-  return merge_overlapping_boxes(std::move(boxes));
+  return merge_boxes(std::move(boxes));
 }
 
 void LightDetector::add_striped_blobs(const ImageView& lines, const std::vector<Blob>& blobs,
@@ -323,12 +322,12 @@ void LightDetector::add_striped_blobs(const ImageView& lines, const std::vector<
 std::optional<MeasuredLight> LightDetector::fit_outline(
     const ImageView& lines, const ModulatedLight& found, const std::vector<Blob>& blobs,
     const Background& background, const std::optional<InverseHeight>& inverse_height) const {
-  const Blob blob = find_lit_pixels_of_light(found.box, blobs, lines.size());
+  const Blob blob = collect_lit_pixels(found.box, blobs, lines.size());
   if (blob.runs.empty()) return std::nullopt;
-  const Lamp* lamp = find_lamp_of_period(found);
+  const Lamp* lamp = find_lamp(found);
   if (!rectangle_sizes_m_.empty() && (!lamp || lamp->shape.kind == ShapeKind::rectangle)) {
     auto light =
-        fit_rectangular_light(lines, blob, find_blob_outline(lines, blob, background),
+        fit_rectangular_light(lines, blob, trace_blob_outline(lines, blob, background),
                               found.fit.period_lines, background, shape_, rectangle_sizes_m_);
     if (light) return light;
   }
@@ -351,9 +350,9 @@ std::vector<MeasuredLight> LightDetector::measure_lights(const ImageView& lines,
     if (is_taken()) light = make_light_from_modulation(found[i], {}, shape_);
     if (is_taken() || (found[i].requires_outline && !has_outline(light))) continue;
     if (found[i].lamp) light.lamp = lamps_by_period_[*found[i].lamp];
-    measure_stripes_in_outline(lines, background, light);
+    measure_in_outline(lines, background, light);
     // Lamps with the same period differ in duty; without known periods a classifier decides.
-    if (!light.lamp) light.lamp = identify_lamp_by_stripes(light.stripes);
+    if (!light.lamp) light.lamp = identify_by_stripes(light.stripes);
     lights.push_back(std::move(light));
   }
   return lights;
@@ -368,14 +367,14 @@ void LightDetector::add_remaining_blobs(const ImageView& lines, const std::vecto
   for (const Blob& blob : blobs) {
     const PixelBox box = blob.blob_bounding_box();
     if (std::min(box.width, box.height) < min_px) continue;
-    MeasuredLight light = make_light_without_outline(box, shape_);
+    MeasuredLight light = make_plain_light(box, shape_);
     const bool is_found = std::ranges::any_of(lights, [&](const Light& other) {
       return other.box.contains(light.pixel) || are_at_same_position(other, light);
     });
     if (is_found) continue;
     light.sigma_px = std::min(light.radius_px, kMaxSigma_px);
     light.stripes = measure_stripes_in_box(lines, box, background);
-    const auto steady_reason = find_reason_for_steady_light(light.stripes);
+    const auto steady_reason = find_steady_reason(light.stripes);
     light.kind = steady_reason ? LightKind::unmodulated : LightKind::unknown;
     light.reason = steady_reason.value_or(LightReason::wrong_shape);
     if (steady_reason == LightReason::unmodulated) {
@@ -387,7 +386,7 @@ void LightDetector::add_remaining_blobs(const ImageView& lines, const std::vecto
       light.kind = LightKind::no_outline;
       light.reason = LightReason::incomplete;
     } else if (!steady_reason) {
-      const auto lamp = identify_lamp_by_stripes(light.stripes);
+      const auto lamp = identify_by_stripes(light.stripes);
       const bool is_lamp_found = lamp && std::ranges::any_of(lights, [&](const Light& other) {
                                    return other.lamp == lamp;
                                  });
@@ -407,16 +406,15 @@ LightDetector::OutlineFits LightDetector::fit_outlines(const ImageView& lines,
   OutlineFits fits{std::vector<std::optional<MeasuredLight>>(found.size()), {}};
   for (int pass = 0; pass < num_passes; ++pass) {
     const bool is_last = pass + 1 == num_passes;
-    const auto inverse_height = is_last
-                                    ? estimate_inverse_height_from_radii(find_radii(found, fits))
-                                    : estimate_inverse_height(find_lamps_in_plane(found, fits));
+    const auto inverse_height = is_last ? fit_inverse_height(list_radii(found, fits))
+                                        : estimate_inverse_height(list_lamps_in_plane(found, fits));
     const bool is_better = inverse_height && (!fits.inverse_height ||
                                               inverse_height->log_sd < fits.inverse_height->log_sd);
     if (pass > 0 && !is_better) continue;
     fits.inverse_height = inverse_height;
     for (std::size_t i = 0; i < found.size(); ++i) {
       auto& outline = fits.outlines[i];
-      const auto radius = predict_radius(find_lamp_of_period(found[i]), inverse_height);
+      const auto radius = predict_radius(find_lamp(found[i]), inverse_height);
       const bool is_disc = outline && outline->outline_kind != LightOutline::rectangle;
       if (!outline || (is_disc && radius && !radius->agrees_with(*outline))) {
         outline = fit_outline(lines, found[i], blobs, background, inverse_height);
@@ -431,33 +429,32 @@ LightDetector::OutlineFits LightDetector::fit_outlines(const ImageView& lines,
   return fits;
 }
 
-std::vector<LampInPlane> LightDetector::find_lamps_in_plane(
+std::vector<LampInPlane> LightDetector::list_lamps_in_plane(
     const std::vector<ModulatedLight>& found, const OutlineFits& fits) const {
   std::vector<LampInPlane> lamps;
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const Lamp* lamp = find_lamp_of_period(found[i]);
+    const Lamp* lamp = find_lamp(found[i]);
     const auto& outline = fits.outlines[i];
-    const auto position = shape_.level_plane_point_from_pixel(
-        outline ? outline->pixel : shape_.swap_image_and_scanline_axes(found[i].center));
+    const auto position =
+        shape_.plane_from_pixel(outline ? outline->pixel : shape_.swap_axes(found[i].center));
     if (lamp == nullptr || !lamp->shape.size_m || !position || !shape_.has_known_lens()) continue;
-    lamps.push_back({*position, lamp->position_m.head<2>(),
-                     compute_height_beyond_first_lamp_m(*lamp),
+    lamps.push_back({*position, lamp->position_m.head<2>(), compute_height_beyond_first_m(*lamp),
                      (outline ? kRimCenterSd : kCentroidSd) * lamp->shape.size_m->maxCoeff() / 2});
   }
   return lamps;
 }
 
-std::vector<LampRadius> LightDetector::find_radii(const std::vector<ModulatedLight>& found,
+std::vector<LampRadius> LightDetector::list_radii(const std::vector<ModulatedLight>& found,
                                                   const OutlineFits& fits) const {
   std::vector<LampRadius> radii;
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const Lamp* lamp = find_lamp_of_period(found[i]);
+    const Lamp* lamp = find_lamp(found[i]);
     const auto& outline = fits.outlines[i];
     if (!outline || outline->outline_kind == LightOutline::rectangle || lamp == nullptr ||
         !lamp->shape.size_m || lamp->shape.kind != ShapeKind::disc)
       continue;
     radii.push_back({outline->plane_outline.radius(), lamp->shape.size_m->x() / 2,
-                     compute_height_beyond_first_lamp_m(*lamp)});
+                     compute_height_beyond_first_m(*lamp)});
   }
   return radii;
 }
@@ -470,7 +467,7 @@ std::optional<KnownRadius> LightDetector::predict_radius(
   for (const Lamp& candidate : lamp ? std::span(lamp, 1) : std::span<const Lamp>(lamps_.lamps)) {
     if (!candidate.shape.size_m || candidate.shape.kind != ShapeKind::disc) return std::nullopt;
     const double radius = inverse_height->compute_radius_in_plane(
-        candidate.shape.size_m->x() / 2, compute_height_beyond_first_lamp_m(candidate));
+        candidate.shape.size_m->x() / 2, compute_height_beyond_first_m(candidate));
     if (!(radius > 0) || !std::isfinite(radius)) return std::nullopt;
     min_radius = std::min(min_radius, radius);
     max_radius = std::max(max_radius, radius);
@@ -480,12 +477,12 @@ std::optional<KnownRadius> LightDetector::predict_radius(
                      inverse_height->log_sd + std::log(max_radius / min_radius) / 2};
 }
 
-const Lamp* LightDetector::find_lamp_of_period(const ModulatedLight& found) const {
+const Lamp* LightDetector::find_lamp(const ModulatedLight& found) const {
   const auto id = found.lamp ? lamps_by_period_[*found.lamp] : std::nullopt;
   return id ? find_lamp_by_id(lamps_.lamps, *id) : nullptr;
 }
 
-double LightDetector::compute_height_beyond_first_lamp_m(const Lamp& lamp) const {
+double LightDetector::compute_height_beyond_first_m(const Lamp& lamp) const {
   const double rise_m = lamp.position_m.z() - lamps_.lamps.front().position_m.z();
   return lamps_.lamps_below_camera ? -rise_m : rise_m;
 }
@@ -493,23 +490,22 @@ double LightDetector::compute_height_beyond_first_lamp_m(const Lamp& lamp) const
 Stripes LightDetector::measure_stripes_in_box(const ImageView& lines, const PixelBox& box,
                                               const Background& background) const {
   const auto chords =
-      find_chords_in_ellipse({box.x, box.y}, {box.end_column(), box.end_row()}, lines.size());
+      list_chords_in_ellipse({box.x, box.y}, {box.end_column(), box.end_row()}, lines.size());
   Stripes stripes = measure_stripes(compute_scanline_signal(lines, chords, background.level));
   if (stripes.period_lines > 0) {
-    stripes.coherence =
-        compute_stripe_coherence_between_parts(lines, chords, background, stripes.period_lines);
+    stripes.coherence = measure_part_coherence(lines, chords, background, stripes.period_lines);
   }
   return stripes;
 }
 
-void LightDetector::measure_stripes_in_outline(const ImageView& lines, const Background& background,
-                                               MeasuredLight& light) const {
+void LightDetector::measure_in_outline(const ImageView& lines, const Background& background,
+                                       MeasuredLight& light) const {
   if (!has_outline(light)) return;
-  const auto swap = [&](const auto& at) { return shape_.swap_image_and_scanline_axes(at); };
+  const auto swap = [&](const auto& at) { return shape_.swap_axes(at); };
   const auto chords =
       light.outline_kind == LightOutline::rectangle
-          ? find_chords_in_polygon(swap(light.inner_polygon), lines.size())
-          : find_chords_in_ellipse(swap(light.box.min()), swap(light.box.max()), lines.size());
+          ? list_chords_in_polygon(swap(light.inner_polygon), lines.size())
+          : list_chords_in_ellipse(swap(light.box.min()), swap(light.box.max()), lines.size());
   const auto signal =
       compute_scanline_signal(lines, chords, background.level, light.has_bright_core);
   const LineProfile profile = make_profile(chords, signal);
@@ -518,20 +514,19 @@ void LightDetector::measure_stripes_in_outline(const ImageView& lines, const Bac
       period ? measure_stripes_of_period(profile, lamp_periods_[*period]) : measure_stripes(signal);
   if (!are_stripes_readable(stripes)) return;
   const auto lamp = period && lamps_by_period_[*period] ? lamps_by_period_[*period]
-                                                        : identify_lamp_by_stripes(stripes);
+                                                        : identify_by_stripes(stripes);
   if (light.lamp && (!lamp || !(period || has_clear_outline(light)))) return;
   // An object may hide a part of the outline; the box of a slanted tube may contain other lights.
-  stripes.coherence = std::max(
-      light.stripes.coherence,
-      compute_stripe_coherence_between_parts(lines, chords, background, stripes.period_lines));
+  stripes.coherence =
+      std::max(light.stripes.coherence,
+               measure_part_coherence(lines, chords, background, stripes.period_lines));
   light.lamp = lamp;
   light.stripes = stripes;
   light.peak_level = *std::max_element(signal.begin(), signal.end());
 }
 
-void LightDetector::correct_light_centers_for_motion(const ImageView& lines,
-                                                     const Background& background,
-                                                     std::vector<MeasuredLight>& lights) const {
+void LightDetector::correct_for_motion(const ImageView& lines, const Background& background,
+                                       std::vector<MeasuredLight>& lights) const {
   constexpr int num_passes = 2;  // the fit of a circle to a strongly sheared outline is inaccurate
   constexpr double start_blur_px = 0.5, rim_log_radius_sd = 0.02;
   std::vector<std::optional<Oval>> ovals(lights.size());
@@ -543,13 +538,13 @@ void LightDetector::correct_light_centers_for_motion(const ImageView& lines,
       if (lights[i].outline_equations && is_fitted[i])
         outlines.push_back(*lights[i].outline_equations);
     }
-    const auto shear = Shear::estimate_shear_from_outlines(outlines);
+    const auto shear = Shear::estimate_shear(outlines);
     if (!shear) break;
     for (std::size_t i = 0; i < lights.size(); ++i) {
       MeasuredLight& light = lights[i];
       if (!light.outline_equations || !is_fitted[i]) continue;
-      Oval oval = shear->predict_oval_from_motion(*light.outline_equations);
-      const Eigen::Vector2d motion = shear->motion_per_scanline(*light.outline_equations);
+      Oval oval = shear->predict_oval(*light.outline_equations);
+      const Eigen::Vector2d motion = shear->motion_per_line(*light.outline_equations);
       std::optional<KnownRadius> radius;
       if (light.outline_kind == LightOutline::rim) {
         radius = {light.plane_outline.radius(), rim_log_radius_sd};
@@ -565,32 +560,32 @@ void LightDetector::correct_light_centers_for_motion(const ImageView& lines,
     }
   }
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    if (ovals[i]) shape_.correct_light_for_motion(*ovals[i], motions[i], lights[i]);
+    if (ovals[i]) shape_.correct_light(*ovals[i], motions[i], lights[i]);
   }
 }
 
 std::vector<Light> LightDetector::detect_lights(const ImageView& image) const {
-  Background background = estimate_image_background(image);
-  ScanlineImage scanlines = make_scanline_image(image, camera_.readout, background);
+  Background background = estimate_background_of(image);
+  ScanlineImage scanlines = make_scanlines(image, camera_.readout, background);
   if (!scanlines.lit.has_nonzero_tile()) {
-    const auto behind_lights = estimate_background_behind_lights(image);
+    const auto behind_lights = estimate_dark_background(image);
     if (!behind_lights) return {};
     background = *behind_lights;
-    scanlines = make_scanline_image(image, camera_.readout, background);
+    scanlines = make_scanlines(image, camera_.readout, background);
   }
   const auto& [lines, lit, memory] = scanlines;
-  const auto blobs = group_pixel_runs_into_blobs(find_pixel_runs(lines, background.threshold, lit),
-                                                 max_dark_rows_);
-  auto found = find_modulated_lights(lines, find_search_boxes(blobs, lines.size()), background,
-                                     lamp_periods_);
+  const auto blobs =
+      group_into_blobs(list_pixel_runs(lines, background.threshold, lit), max_dark_rows_);
+  auto found = detect_modulated_lights(lines, list_search_boxes(blobs, lines.size()), background,
+                                       lamp_periods_);
   add_striped_blobs(lines, blobs, background, found);
   OutlineFits fits = fit_outlines(lines, found, blobs, background);
   const auto inverse_height = fits.inverse_height;
   auto lights = measure_lights(lines, found, std::move(fits), background);
-  correct_light_centers_for_motion(lines, background, lights);
-  identify_lamps_of_lights(inverse_height, image.size(), lights);
+  correct_for_motion(lines, background, lights);
+  identify_lamps(inverse_height, image.size(), lights);
   add_remaining_blobs(lines, blobs, background, lights);
-  if (!shape_.has_known_lens()) add_error_of_unknown_lens(image.size(), lights);
+  if (!shape_.has_known_lens()) add_lens_error(image.size(), lights);
   std::sort(lights.begin(), lights.end(), [](const Light& a, const Light& b) {
     return a.pixel.y() != b.pixel.y() ? a.pixel.y() < b.pixel.y() : a.pixel.x() < b.pixel.x();
   });
@@ -609,8 +604,7 @@ void reject(Light& light, LightReason reason) {
 /// lights by the same factor, which is the median over the lights with clear stripes. At least
 /// three such lights are required. Other periods may differ by kMaxUnclearDrift from those of their
 /// lamps.
-void reject_contradicting_periods(const LampMap& lamps, double row_time_s,
-                                  std::vector<MeasuredLight>& lights) {
+void reject_periods(const LampMap& lamps, double row_time_s, std::vector<MeasuredLight>& lights) {
   constexpr std::size_t min_lights = 3;
   const auto has_clear_period = [](const Light& light) {
     return has_clear_outline(light) && are_stripes_reliable(light.stripes);
@@ -637,7 +631,7 @@ void reject_contradicting_periods(const LampMap& lamps, double row_time_s,
 /// Prefers lights with an outline, of these the one with the smallest sigma; without an outline the
 /// largest light. Rejects all if two of them have similar size and brightness. A mirror reflects
 /// less than all light, and lenses darken the corners of an image.
-void keep_best_light_of_lamp(int lamp, std::vector<MeasuredLight>& lights) {
+void keep_best_light(int lamp, std::vector<MeasuredLight>& lights) {
   constexpr double min_area_ratio = 2, min_peak_ratio = 2;
   std::vector<MeasuredLight*> claims;
   for (MeasuredLight& light : lights) {
@@ -679,14 +673,14 @@ bool is_light_fully_in_view(const Light& light, const ImageSize& size) {
          light.box.max().y() < size.height - 0.5;
 }
 
-std::optional<int> LightDetector::identify_lamp_by_stripes(const Stripes& stripes) const {
-  if (classifier_) return vlp::identify_lamp_by_classifier(*classifier_, stripes);
+std::optional<int> LightDetector::identify_by_stripes(const Stripes& stripes) const {
+  if (classifier_) return vlp::identify_by_classifier(*classifier_, stripes);
   if (!camera_.row_time_s) return std::nullopt;
-  return identify_lamp_by_frequency(lamps_, *camera_.row_time_s, stripes);
+  return identify_by_frequency(lamps_, *camera_.row_time_s, stripes);
 }
 
-std::optional<double> LightDetector::compute_log_aspect_ratio_difference(const MeasuredLight& light,
-                                                                         int lamp) const {
+std::optional<double> LightDetector::compute_log_aspect_difference(const MeasuredLight& light,
+                                                                   int lamp) const {
   // An unknown lens changes the aspect ratio by more than an unknown tilt.
   const double max_off = shape_.has_known_lens() ? 2 * kUnknownTiltSd : 0.3;
   const Lamp* mapped = find_lamp_by_id(lamps_.lamps, lamp);  // a classifier may have other lamps
@@ -698,8 +692,8 @@ std::optional<double> LightDetector::compute_log_aspect_ratio_difference(const M
   return off < max_off ? std::optional(off) : std::nullopt;
 }
 
-void LightDetector::reject_lights_of_other_size(const std::optional<InverseHeight>& inverse_height,
-                                                std::vector<MeasuredLight>& lights) const {
+void LightDetector::reject_other_size(const std::optional<InverseHeight>& inverse_height,
+                                      std::vector<MeasuredLight>& lights) const {
   constexpr double max_outline_off = 0.1, max_sds = 4, max_centroid_off = 0.35;
   constexpr int min_lamps = 3;
   struct Size {
@@ -712,7 +706,7 @@ void LightDetector::reject_lights_of_other_size(const std::optional<InverseHeigh
     const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps_.lamps, *light.lamp) : nullptr;
     if (!lamp) continue;
     const auto radius = predict_radius(lamp, inverse_height);
-    const auto measured = measure_radius_in_plane(light);
+    const auto measured = measure_radius(light);
     if (!radius || !measured) continue;
     sizes.push_back({&light, std::log(*measured / radius->radius)});
     if (!has_outline(light) || std::abs(sizes.back().log_ratio) > max_outline_off) continue;
@@ -734,8 +728,8 @@ void LightDetector::reject_lights_of_other_size(const std::optional<InverseHeigh
   }
 }
 
-void LightDetector::reject_misplaced_lights(const std::optional<InverseHeight>& inverse_height,
-                                            std::vector<MeasuredLight>& lights) const {
+void LightDetector::reject_misplaced(const std::optional<InverseHeight>& inverse_height,
+                                     std::vector<MeasuredLight>& lights) const {
   constexpr int min_lamps = 2;
   constexpr double max_off_fraction = 0.1;
   if (!inverse_height) return;
@@ -750,10 +744,10 @@ void LightDetector::reject_misplaced_lights(const std::optional<InverseHeight>& 
   const double y_sign = lamps_.lamps_below_camera ? -1 : 1;  // a camera that looks down
   for (MeasuredLight& light : lights) {
     const Lamp* lamp = light.lamp ? find_lamp_by_id(lamps_.lamps, *light.lamp) : nullptr;
-    const auto at = shape_.level_plane_point_from_pixel(light.pixel);
+    const auto at = shape_.plane_from_pixel(light.pixel);
     if (!lamp || !at) continue;
     const double height_m =
-        1 / inverse_height->compute_radius_in_plane(1, compute_height_beyond_first_lamp_m(*lamp));
+        1 / inverse_height->compute_radius_in_plane(1, compute_height_beyond_first_m(*lamp));
     const double size_m = lamp->shape.size_m ? lamp->shape.size_m->maxCoeff() : 0;
     const Place place{&light, size_m, height_m * Complex(at->x(), at->y()),
                       Complex(lamp->position_m.x(), y_sign * lamp->position_m.y())};
@@ -786,26 +780,26 @@ void LightDetector::reject_misplaced_lights(const std::optional<InverseHeight>& 
   }
 }
 
-std::optional<double> LightDetector::measure_radius_in_plane(const MeasuredLight& light) const {
+std::optional<double> LightDetector::measure_radius(const MeasuredLight& light) const {
   if (light.outline_kind == LightOutline::rectangle) return std::nullopt;
   if (has_outline(light)) return light.plane_outline.radius();
   const Eigen::Vector2d half(light.radius_px, 0);
-  const auto before = shape_.level_plane_point_from_pixel(light.pixel - half),
-             after = shape_.level_plane_point_from_pixel(light.pixel + half);
+  const auto before = shape_.plane_from_pixel(light.pixel - half),
+             after = shape_.plane_from_pixel(light.pixel + half);
   if (!before || !after) return std::nullopt;
   return (*after - *before).norm() / 2;
 }
 
-void LightDetector::identify_lamps_of_lights(const std::optional<InverseHeight>& inverse_height,
-                                             const ImageSize& size,
-                                             std::vector<MeasuredLight>& lights) const {
+void LightDetector::identify_lamps(const std::optional<InverseHeight>& inverse_height,
+                                   const ImageSize& size,
+                                   std::vector<MeasuredLight>& lights) const {
   // A surface that blurs the image of a lamp reflects less than 5 % of its light in one direction.
   // A tone curve of gamma 2.2 displays this as a quarter of the level.
   constexpr double min_peak_ratio = 0.25;
   constexpr double max_rise_ratio = 3, min_rise_px = 1;
   double sharpest_px = std::numeric_limits<double>::infinity(), brightest = 0;
   for (MeasuredLight& light : lights) {
-    const auto steady = find_reason_for_steady_light(light.stripes);
+    const auto steady = find_steady_reason(light.stripes);
     light.kind = steady ? LightKind::unmodulated : LightKind::unknown;
     if (steady) {
       reject(light, *steady);
@@ -814,12 +808,11 @@ void LightDetector::identify_lamps_of_lights(const std::optional<InverseHeight>&
     if (has_outline(light)) sharpest_px = std::min(sharpest_px, light.rise_px);
     if (!are_stripes_readable(light.stripes)) light.reason = LightReason::no_clear_period;
     if (!light.lamp) continue;
-    const auto off = compute_log_aspect_ratio_difference(light, *light.lamp);
+    const auto off = compute_log_aspect_difference(light, *light.lamp);
     if (!off) {
       reject(light, LightReason::wrong_shape);
     } else if (shape_.has_known_lens()) {
-      add_hidden_end_error_to_center_sigma(*off, shape_.is_camera_tilted() ? 0 : kUnknownTiltSd,
-                                           light);
+      add_hidden_end_error(*off, shape_.is_camera_tilted() ? 0 : kUnknownTiltSd, light);
     }
     if (light.lamp && has_outline(light)) brightest = std::max(brightest, light.peak_level);
   }
@@ -835,13 +828,13 @@ void LightDetector::identify_lamps_of_lights(const std::optional<InverseHeight>&
       reject(light, LightReason::wrong_shape);
     }
   }
-  reject_lights_of_other_size(inverse_height, lights);
+  reject_other_size(inverse_height, lights);
   // A classifier does not use the frequencies of the map.
   if (camera_.row_time_s && !classifier_) {
-    reject_contradicting_periods(lamps_, *camera_.row_time_s, lights);
+    reject_periods(lamps_, *camera_.row_time_s, lights);
   }
-  for (const Lamp& lamp : lamps_.lamps) keep_best_light_of_lamp(lamp.id, lights);
-  reject_misplaced_lights(inverse_height, lights);
+  for (const Lamp& lamp : lamps_.lamps) keep_best_light(lamp.id, lights);
+  reject_misplaced(inverse_height, lights);
   const bool sure = std::ranges::any_of(lights, [](const Light& light) {
     return light.lamp && light.stripes.periods >= kMinReliablePeriods;
   });

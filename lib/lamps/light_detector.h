@@ -37,8 +37,8 @@ DetectorCamera make_detector_camera(const Calibration& calibration);
 /// Detects and identifies the lamps of a map in images of a rolling-shutter camera. All methods are
 /// const and thread-safe.
 ///
-/// Search: lights are found by their modulation, whatever their shape, see find_modulated_lights(),
-/// and as lit areas with stripes.
+/// Search: lights are found by their modulation, whatever their shape, see
+/// detect_modulated_lights(), and as lit areas with stripes.
 ///
 /// Center: from a fit of the outline to the levels near it, see fit_rim_of_light() and
 /// fit_rectangular_light(). Without an outline it is the centroid of the lit area.
@@ -55,11 +55,10 @@ class LightDetector {
 
   /// Returns a copy of the detector for a camera with another tilt. If the tilt is unknown,
   /// ellipses are fitted in the image, as without a lens.
-  LightDetector copy_detector_for_camera_tilt(
-      const std::optional<Eigen::Matrix3d>& level_from_camera) const;
+  LightDetector copy_for_tilt(const std::optional<Eigen::Matrix3d>& level_from_camera) const;
 
   /// Returns a copy of the detector for images with another readout direction.
-  LightDetector copy_detector_with_readout_direction(Readout readout) const;
+  LightDetector copy_with_readout(Readout readout) const;
 
   Readout readout_direction() const { return camera_.readout; }
 
@@ -70,7 +69,7 @@ class LightDetector {
     std::optional<InverseHeight> inverse_height;
   };
   /// Returns the parts of the image to be searched for lights.
-  std::vector<PixelBox> find_search_boxes(const std::vector<Blob>& blobs,
+  std::vector<PixelBox> list_search_boxes(const std::vector<Blob>& blobs,
                                           const ImageSize& size) const;
   /// Adds blobs with stripes in which no modulated light was found: lights with few periods, or
   /// that touch others.
@@ -96,10 +95,10 @@ class LightDetector {
   void add_remaining_blobs(const ImageView& lines, const std::vector<Blob>& blobs,
                            const Background& background, std::vector<MeasuredLight>& lights) const;
   /// Returns the lamps of modulated lights, with the centers of their outlines if known.
-  std::vector<LampInPlane> find_lamps_in_plane(const std::vector<ModulatedLight>& found,
+  std::vector<LampInPlane> list_lamps_in_plane(const std::vector<ModulatedLight>& found,
                                                const OutlineFits& fits) const;
   /// Returns the radii of discs of known size.
-  std::vector<LampRadius> find_radii(const std::vector<ModulatedLight>& found,
+  std::vector<LampRadius> list_radii(const std::vector<ModulatedLight>& found,
                                      const OutlineFits& fits) const;
   /// Returns the radius of a lamp in the level plane. Without a lamp, returns the common radius of
   /// all lamps of the map. Returns std::nullopt if it is no disc of known size, if the lamps differ
@@ -107,37 +106,36 @@ class LightDetector {
   std::optional<KnownRadius> predict_radius(
       const Lamp* lamp, const std::optional<InverseHeight>& inverse_height) const;
   /// Returns the lamp with the period of a modulated light; nullptr if there is none or several.
-  const Lamp* find_lamp_of_period(const ModulatedLight& found) const;
-  double compute_height_beyond_first_lamp_m(const Lamp& lamp) const;
+  const Lamp* find_lamp(const ModulatedLight& found) const;
+  double compute_height_beyond_first_m(const Lamp& lamp) const;
   /// Measures the stripes in the ellipse in a box.
   Stripes measure_stripes_in_box(const ImageView& lines, const PixelBox& box,
                                  const Background& background) const;
   /// Measures the stripes of a light within its outline. Keeps those of the modulated light if they
   /// belong to a lamp and the outline is not clear.
-  void measure_stripes_in_outline(const ImageView& lines, const Background& background,
-                                  MeasuredLight& light) const;
+  void measure_in_outline(const ImageView& lines, const Background& background,
+                          MeasuredLight& light) const;
   /// Fits the outlines of discs again, twice, sheared by the camera motion that Shear estimates.
-  void correct_light_centers_for_motion(const ImageView& lines, const Background& background,
-                                        std::vector<MeasuredLight>& lights) const;
-  void identify_lamps_of_lights(const std::optional<InverseHeight>& inverse_height,
-                                const ImageSize& size, std::vector<MeasuredLight>& lights) const;
+  void correct_for_motion(const ImageView& lines, const Background& background,
+                          std::vector<MeasuredLight>& lights) const;
+  void identify_lamps(const std::optional<InverseHeight>& inverse_height, const ImageSize& size,
+                      std::vector<MeasuredLight>& lights) const;
   /// Rejects lights with few periods at a wrong position. The lights with more periods determine
   /// rotation and translation of the map. The tolerance is 10 % of the lamp's size and of its
   /// distance from their mean, plus half of its size without an outline. Has no effect if a light
   /// with more periods exceeds it.
-  void reject_misplaced_lights(const std::optional<InverseHeight>& inverse_height,
-                               std::vector<MeasuredLight>& lights) const;
+  void reject_misplaced(const std::optional<InverseHeight>& inverse_height,
+                        std::vector<MeasuredLight>& lights) const;
   /// Rejects lights whose radius differs from that of their lamp, if at least three others agree.
-  void reject_lights_of_other_size(const std::optional<InverseHeight>& inverse_height,
-                                   std::vector<MeasuredLight>& lights) const;
+  void reject_other_size(const std::optional<InverseHeight>& inverse_height,
+                         std::vector<MeasuredLight>& lights) const;
   /// Returns the radius of a light in the level plane; std::nullopt for rectangles.
-  std::optional<double> measure_radius_in_plane(const MeasuredLight& light) const;
+  std::optional<double> measure_radius(const MeasuredLight& light) const;
   /// Returns the absolute difference between the log aspect ratios of a light and a lamp. Returns
   /// std::nullopt if the light has another shape or the difference exceeds its limit.
-  std::optional<double> compute_log_aspect_ratio_difference(const MeasuredLight& light,
-                                                            int lamp) const;
+  std::optional<double> compute_log_aspect_difference(const MeasuredLight& light, int lamp) const;
   /// Returns the id of the lamp with these stripes; std::nullopt if no lamp or several lamps agree.
-  std::optional<int> identify_lamp_by_stripes(const Stripes& stripes) const;
+  std::optional<int> identify_by_stripes(const Stripes& stripes) const;
 
   LampMap lamps_;
   DetectorCamera camera_;

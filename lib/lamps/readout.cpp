@@ -13,7 +13,7 @@ std::optional<Readout> ReadoutDirectionEvidence::readout_direction() const {
   return std::nullopt;
 }
 
-double sum_readout_direction_evidence(std::span<const Light> lights) {
+double sum_evidence(std::span<const Light> lights) {
   double sum = 0;
   for (const Light& light : lights) {
     if (!is_light_modulated(light)) continue;
@@ -22,15 +22,15 @@ double sum_readout_direction_evidence(std::span<const Light> lights) {
   return sum;
 }
 
-void add_readout_evidence_of_image(const ImageView& image, ReadoutDirectionEvidence& evidence) {
+void add_evidence(const ImageView& image, ReadoutDirectionEvidence& evidence) {
   const LightDetector by_rows({}, {Readout::rows, {}, {}});
-  evidence.rows += sum_readout_direction_evidence(by_rows.detect_lights(image));
-  evidence.columns += sum_readout_direction_evidence(
-      by_rows.copy_detector_with_readout_direction(Readout::columns).detect_lights(image));
+  evidence.rows += sum_evidence(by_rows.detect_lights(image));
+  evidence.columns +=
+      sum_evidence(by_rows.copy_with_readout(Readout::columns).detect_lights(image));
 }
 
-std::optional<Readout> estimate_readout_direction(
-    std::size_t images, const std::function<ImageView(std::size_t)>& image) {
+std::optional<Readout> estimate_readout(std::size_t images,
+                                        const std::function<ImageView(std::size_t)>& image) {
   constexpr double sufficient_evidence = 6;
   constexpr int max_used = 8;
   ReadoutDirectionEvidence evidence;
@@ -39,7 +39,7 @@ std::optional<Readout> estimate_readout_direction(
     const ImageView frame = image(i);
     if (frame.empty()) continue;
     const double before = evidence.rows + evidence.columns;
-    add_readout_evidence_of_image(frame, evidence);
+    add_evidence(frame, evidence);
     if (evidence.rows + evidence.columns > before) ++used;
     if (evidence.rows + evidence.columns >= sufficient_evidence && evidence.readout_direction())
       break;
@@ -47,15 +47,13 @@ std::optional<Readout> estimate_readout_direction(
   return evidence.readout_direction();
 }
 
-LightsWithReadout detect_lights_with_unknown_readout(const LightDetector& detector,
-                                                     const ImageView& image) {
+LightsWithReadout detect_both_readouts(const LightDetector& detector, const ImageView& image) {
   const Readout default_readout = detector.readout_direction();
   const Readout other_readout = default_readout == Readout::rows ? Readout::columns : Readout::rows;
   LightsWithReadout result{default_readout, detector.detect_lights(image)};
-  std::vector<Light> lights =
-      detector.copy_detector_with_readout_direction(other_readout).detect_lights(image);
-  const double default_evidence = sum_readout_direction_evidence(result.lights),
-               other_evidence = sum_readout_direction_evidence(lights);
+  std::vector<Light> lights = detector.copy_with_readout(other_readout).detect_lights(image);
+  const double default_evidence = sum_evidence(result.lights),
+               other_evidence = sum_evidence(lights);
   const ReadoutDirectionEvidence evidence =
       default_readout == Readout::rows ? ReadoutDirectionEvidence{default_evidence, other_evidence}
                                        : ReadoutDirectionEvidence{other_evidence, default_evidence};

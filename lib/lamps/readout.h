@@ -28,11 +28,11 @@ struct ReadoutDirectionEvidence {
 
 /// Returns the sum of ReadoutDirectionEvidence over `lights`, which were detected with one readout
 /// direction.
-double sum_readout_direction_evidence(std::span<const Light> lights);
+double sum_evidence(std::span<const Light> lights);
 
 /// Adds the evidence of a whole image. With the correct readout direction a lamp has stripes; with
 /// the other one it breaks into pieces or has no stripes.
-void add_readout_evidence_of_image(const ImageView& image, ReadoutDirectionEvidence& evidence);
+void add_evidence(const ImageView& image, ReadoutDirectionEvidence& evidence);
 
 /// Estimates the readout direction from images in their order, from at most eight images with
 /// modulated lights. Stops when the evidence is clear. Returns std::nullopt if it is not.
@@ -40,8 +40,8 @@ void add_readout_evidence_of_image(const ImageView& image, ReadoutDirectionEvide
 /// @param images  number of images
 /// @param image   returns an image by index, valid until the next call; empty if the image is
 ///        unusable
-std::optional<Readout> estimate_readout_direction(
-    std::size_t images, const std::function<ImageView(std::size_t)>& image);
+std::optional<Readout> estimate_readout(std::size_t images,
+                                        const std::function<ImageView(std::size_t)>& image);
 
 /// Lights of an image and the readout direction with which they were detected.
 struct LightsWithReadout {
@@ -51,7 +51,6 @@ struct LightsWithReadout {
 
 /// Detects the lights of an image with unknown readout direction. Uses the detector's direction, or
 /// the other one if the image has clear evidence for it, for example if a phone rotated the image.
-LightsWithReadout detect_lights_with_unknown_readout(const LightDetector& detector,
-                                                     const ImageView& image);
+LightsWithReadout detect_both_readouts(const LightDetector& detector, const ImageView& image);
 
 }  // namespace vlp

@@ -17,7 +17,7 @@ namespace vlp {
 
 namespace {
 
-BodyState make_body_state_from_camera_pose(const FreePose& camera, const BodyProblem& problem) {
+BodyState make_body_state(const FreePose& camera, const BodyProblem& problem) {
   const Eigen::Matrix3d world_from_body = camera.camera_from_world.transpose();
   BodyState state{{camera.position_m - world_from_body * problem.arm_m,
                    std::atan2(world_from_body(1, 0), world_from_body(0, 0))},
@@ -33,7 +33,7 @@ bool is_below_lamps(const FreePose& camera, const std::array<Eigen::Vector3d, 3>
   });
 }
 
-double compute_mean_lamp_distance_m(const FrameObservations& frame, const BodyState& state) {
+double compute_mean_distance_m(const FrameObservations& frame, const BodyState& state) {
   double sum = 0;
   for (const LampObservation& seen : frame.observations_span()) {
     sum += (seen.lamp_m - state.pose.position_m).norm();
@@ -63,28 +63,28 @@ LevelSightings::LevelSightings(const FrameObservations& frame,
   }
 }
 
-BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem& problem,
-                                           const Eigen::Matrix3d& lean) {
+BodyState make_body_state(const Pose& camera, const BodyProblem& problem,
+                          const Eigen::Matrix3d& lean) {
   BodyState state{camera, problem.prior.mean.motion};
   state.pose.position_m -= rotation_about_z(camera.yaw_rad) * lean * problem.arm_m;
   return state;
 }
 
-InitialStates compute_initial_body_states_from_three_lamps(const FrameObservations& frame,
-                                                           const std::array<std::size_t, 3>& lamps,
-                                                           const BodyProblem& problem) {
+InitialStates solve_for_three_lamps(const FrameObservations& frame,
+                                    const std::array<std::size_t, 3>& lamps,
+                                    const BodyProblem& problem) {
   std::array<Eigen::Vector3d, 3> points_m, rays;
   for (std::size_t i = 0; i < 3; ++i) {
     points_m[i] = frame.sightings[lamps[i]].lamp_m;
     rays[i] = frame.sightings[lamps[i]].ray;
   }
-  const ThreeLampPoses found = compute_poses_from_three_lamps(points_m, rays);
+  const ThreeLampPoses found = solve_three_lamp_poses(points_m, rays);
   InitialStates initial_states;
   for (int i = 0; i < found.count; ++i) {
     const FreePose& pose = found.poses[static_cast<std::size_t>(i)];
     if (!is_below_lamps(pose, points_m)) continue;
     initial_states.states[static_cast<std::size_t>(initial_states.count++)] =
-        make_body_state_from_camera_pose(pose, problem);
+        make_body_state(pose, problem);
   }
   initial_states.status = initial_states.count > 0 ? FixStatus::ok
                           : found.count > 0        ? FixStatus::lamp_below_camera
@@ -92,11 +92,11 @@ InitialStates compute_initial_body_states_from_three_lamps(const FrameObservatio
   return initial_states;
 }
 
-bool is_body_position_determined(const FrameObservations& frame, const BodyPrior& prior,
-                                 const BodyFix& fix) {
+bool is_position_determined(const FrameObservations& frame, const BodyPrior& prior,
+                            const BodyFix& fix) {
   // An estimated tilt or motion adds errors that are not linear in the state.
-  const double max_sd_fraction = prior.is_motion_or_tilt_estimated() ? 0.25 : 1;
-  const double limit_m = max_sd_fraction * compute_mean_lamp_distance_m(frame, fix.state);
+  const double max_sd_fraction = prior.is_motion_or_tilt_free() ? 0.25 : 1;
+  const double limit_m = max_sd_fraction * compute_mean_distance_m(frame, fix.state);
   return fix.covariance.diagonal().head<3>().maxCoeff() < limit_m * limit_m;
 }
 
@@ -111,19 +111,19 @@ InitialStates compute_level_states(const FrameObservations& frame, const BodyPro
     start = compute_initial_poses(level.observations_span());
   } else if (level.are_lamps_above_horizon && std::isfinite(prior.max_variance(kBodyZ, 2))) {
     const double arm_z_m = (lean * (problem.arm_m - prior.height_point_m)).z();
-    const auto pose = compute_pose_at_known_height_and_yaw(
+    const auto pose = solve_for_one_lamp(
         level.sightings.front(), prior.mean.pose.position_m.z() + arm_z_m, prior.mean.pose.yaw_rad);
     if (pose) start = {FixStatus::ok, 1, {*pose}};
   }
   InitialStates states{start.status, start.count, {}};
   for (std::size_t i = 0; static_cast<int>(i) < start.count; ++i) {
-    states.states[i] = make_body_state_from_camera_pose(start.poses[i], problem, lean);
+    states.states[i] = make_body_state(start.poses[i], problem, lean);
   }
   return states;
 }
 
 /// Returns three lamps of the current frame that are far apart and far from collinear.
-std::array<std::size_t, 3> find_widest_lamps(const FrameObservations& frame) {
+std::array<std::size_t, 3> select_widest_lamps(const FrameObservations& frame) {
   const auto best = [&](const auto& value) {
     std::size_t found = 0;
     for (std::size_t i = 1; i < frame.num_current; ++i) {
@@ -153,7 +153,7 @@ bool are_below_lamps(const FrameObservations& frame, const BodyProblem& problem,
 }
 
 double compute_prior_chi_squared(const BodyState& state, const BodyProblem& problem) {
-  return compute_body_state_chi_squared({}, problem, state).value_or(0);
+  return compute_chi_squared({}, problem, state).value_or(0);
 }
 
 /// Returns true if the chi-squared of a state is much smaller than its distance from the fix, in
@@ -165,7 +165,7 @@ bool is_beyond_linear_range(const BodyState& state, double chi_squared, const Bo
   difference << state.pose.position_m - fix.state.pose.position_m,
       wrap_angle_rad(state.pose.yaw_rad - fix.state.pose.yaw_rad);
   const auto information =
-      invert_positive_definite_matrix(Eigen::Matrix4d(fix.covariance.topLeftCorner<4, 4>()));
+      invert_positive_definite(Eigen::Matrix4d(fix.covariance.topLeftCorner<4, 4>()));
   if (!information) return true;
   return difference.dot(*information * difference) >
          max_ratio * (chi_squared - fix.chi_squared) + max_excess;
@@ -197,8 +197,8 @@ void set_candidates(Explanations& found, double scale, BodySolution& solution) {
 
 /// Returns the fix with the smallest chi-squared from several initial states; `ambiguous` if
 /// another state explains the frame nearly as well.
-BodySolution find_best_body_solution(const InitialStates& initial_states,
-                                     const FrameObservations& frame, const BodyProblem& problem) {
+BodySolution select_solution(const InitialStates& initial_states, const FrameObservations& frame,
+                             const BodyProblem& problem) {
   constexpr double hopeless = 100, small = 100, same_m = 1e-4;
   std::array<double, kMaxInitialStates> at_start;
   at_start.fill(std::numeric_limits<double>::infinity());
@@ -207,8 +207,8 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
   const bool is_single = initial_states.count == 1 && !is_exact;
   if (is_single) at_start[0] = 0;
   for (std::size_t i = 0; !is_single && static_cast<int>(i) < initial_states.count; ++i) {
-    const auto chi_squared = compute_body_state_chi_squared(frame.observations_span(), problem,
-                                                            initial_states.states[i]);
+    const auto chi_squared =
+        compute_chi_squared(frame.observations_span(), problem, initial_states.states[i]);
     if (chi_squared) at_start[i] = *chi_squared;
   }
   const double min_chi_squared = *std::min_element(at_start.begin(), at_start.end());
@@ -229,8 +229,8 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
     if (!best || (!is_known && fix->chi_squared < best->chi_squared)) best = fix;
   }
   if (!best) return {FixStatus::degenerate};
-  if (!is_body_position_determined(frame, problem.prior, *best)) {
-    const bool is_pose_alone = !problem.prior.is_motion_or_tilt_estimated();
+  if (!is_position_determined(frame, problem.prior, *best)) {
+    const bool is_pose_alone = !problem.prior.is_motion_or_tilt_free();
     return {is_pose_alone ? FixStatus::degenerate : FixStatus::undetermined, *best};
   }
   for (std::size_t i = 0; is_exact && static_cast<int>(i) < initial_states.count; ++i) {
@@ -250,24 +250,23 @@ BodySolution find_best_body_solution(const InitialStates& initial_states,
 /// Computes the fix with free roll and pitch from the three lamps that are farthest apart. If
 /// motion or noise hides their pose, tries other lamps in place of the third. Returns std::nullopt
 /// if all lamps are collinear.
-std::optional<BodySolution> estimate_body_with_free_tilt(const FrameObservations& frame,
-                                                         const BodyProblem& problem) {
+std::optional<BodySolution> estimate_free_tilt(const FrameObservations& frame,
+                                               const BodyProblem& problem) {
   constexpr std::size_t max_tries = 8;
   if (frame.num_current < 3) return std::nullopt;
-  const auto [first, second, widest] = find_widest_lamps(frame);
+  const auto [first, second, widest] = select_widest_lamps(frame);
   if (widest == first || widest == second) return std::nullopt;
   std::optional<BodySolution> best;
   std::size_t third = widest;
   for (std::size_t i = 0; i < std::min(frame.num_current, max_tries);
        ++i, third = (third + 1) % frame.num_current) {
     if (third == first || third == second) continue;
-    InitialStates initial_states =
-        compute_initial_body_states_from_three_lamps(frame, {first, second, third}, problem);
+    InitialStates initial_states = solve_for_three_lamps(frame, {first, second, third}, problem);
     // Noise may remove the solution of three lamps that is close to the known inclination.
     if (initial_states.count > 0 && !is_roll_pitch_unknown(problem.prior))
       initial_states.add(compute_level_states(frame, problem));
     const BodySolution solution = initial_states.count > 0
-                                      ? find_best_body_solution(initial_states, frame, problem)
+                                      ? select_solution(initial_states, frame, problem)
                                       : BodySolution{initial_states.status};
     const bool better =
         !best || (has_fix(solution) &&
@@ -282,19 +281,17 @@ std::optional<BodySolution> estimate_body_with_free_tilt(const FrameObservations
 
 }  // namespace
 
-BodySolution estimate_body_state_from_all_lamps(const FrameObservations& frame,
-                                                const BodyProblem& problem) {
+BodySolution estimate_from_all(const FrameObservations& frame, const BodyProblem& problem) {
   // Three lamps have several solutions even if roll and pitch are roughly known.
   const bool has_several = problem.prior.is_tilt_estimated() && frame.size == 3;
   if (has_several || is_roll_pitch_unknown(problem.prior)) {
-    if (const auto solution = estimate_body_with_free_tilt(frame, problem);
-        solution && has_fix(*solution)) {
+    if (const auto solution = estimate_free_tilt(frame, problem); solution && has_fix(*solution)) {
       return *solution;
     }
   }
   const InitialStates start = compute_level_states(frame, problem);
   if (start.count == 0) return {start.status};
-  return find_best_body_solution(start, frame, problem);
+  return select_solution(start, frame, problem);
 }
 
 }  // namespace vlp

@@ -66,33 +66,32 @@ struct LevelSightings {
 };
 
 /// Returns the state of the body for a pose of the camera and the motion of the prior.
-BodyState make_body_state_from_camera_pose(const Pose& camera, const BodyProblem& problem,
-                                           const Eigen::Matrix3d& lean);
+BodyState make_body_state(const Pose& camera, const BodyProblem& problem,
+                          const Eigen::Matrix3d& lean);
 
 /// Returns true if roll and pitch are so uncertain that a level camera is no initial state.
 bool is_roll_pitch_unknown(const BodyPrior& prior);
 
 /// Computes the states below the lamps from three of them.
-InitialStates compute_initial_body_states_from_three_lamps(const FrameObservations& frame,
-                                                           const std::array<std::size_t, 3>& lamps,
-                                                           const BodyProblem& problem);
+InitialStates solve_for_three_lamps(const FrameObservations& frame,
+                                    const std::array<std::size_t, 3>& lamps,
+                                    const BodyProblem& problem);
 
 /// Returns true if the standard deviation of the position is at most the mean distance to the
 /// lamps, and a quarter of it if motion or tilt are estimated.
-bool is_body_position_determined(const FrameObservations& frame, const BodyPrior& prior,
-                                 const BodyFix& fix);
+bool is_position_determined(const FrameObservations& frame, const BodyPrior& prior,
+                            const BodyFix& fix);
 
 /// Computes the fix of all lamps, assuming that the identities are correct. Initial states:
 ///   one lamp   the position at height and yaw of the prior;
 ///   others     the poses of a level camera (compute_initial_poses()), or if roll and pitch are
 ///              unknown the poses from the three lamps that are farthest apart
-///              (compute_poses_from_three_lamps()).
+///              (solve_three_lamp_poses()).
 /// Statuses:
 ///   degenerate    the lamps do not determine the position, with known motion, roll and pitch
 ///   undetermined  lamps and priors do not determine the position
 ///   ambiguous     another state is nearly as likely: by a factor of exp(-6) or more. Such states
 ///                 are the candidates.
-BodySolution estimate_body_state_from_all_lamps(const FrameObservations& frame,
-                                                const BodyProblem& problem);
+BodySolution estimate_from_all(const FrameObservations& frame, const BodyProblem& problem);
 
 }  // namespace vlp

@@ -30,7 +30,7 @@ Roots solve_quadratic(double a, double b, double c) {
 
 }  // namespace
 
-TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& second) {
+TwoLampPoses solve_for_two_lamps(const Sighting& first, const Sighting& second) {
   const Eigen::Vector2d d = (second.lamp_m - first.lamp_m).head<2>();
   const Eigen::Vector2d difference = second.z - first.z;
   const double h = second.lamp_m.z() - first.lamp_m.z();
@@ -70,7 +70,7 @@ bool are_at_one_height(std::span<const Sighting> sightings) {
   });
 }
 
-const Sighting& find_farthest_from(const Sighting& from, std::span<const Sighting> sightings) {
+const Sighting& select_farthest_from(const Sighting& from, std::span<const Sighting> sightings) {
   return *std::max_element(sightings.begin(), sightings.end(),
                            [&](const Sighting& a, const Sighting& b) {
                              return (a.z - from.z).squaredNorm() < (b.z - from.z).squaredNorm();
@@ -81,17 +81,17 @@ const Sighting& find_farthest_from(const Sighting& from, std::span<const Sightin
 
 InitialLevelPoses compute_initial_poses(std::span<const Sighting> sightings) {
   if (sightings.size() > 2 && are_at_one_height(sightings)) {
-    const auto pose = compute_pose_from_coplanar_lamps(sightings);
+    const auto pose = solve_for_coplanar_lamps(sightings);
     if (!pose) return {FixStatus::degenerate};
     return {FixStatus::ok, 1, {*pose}};
   }
-  const Sighting& first = find_farthest_from(sightings.front(), sightings);
-  const TwoLampPoses pair = compute_two_lamp_poses(first, find_farthest_from(first, sightings));
+  const Sighting& first = select_farthest_from(sightings.front(), sightings);
+  const TwoLampPoses pair = solve_for_two_lamps(first, select_farthest_from(first, sightings));
   if (pair.count > 0) return {FixStatus::ok, pair.count, pair.poses};
   return {pair.lamp_below_camera ? FixStatus::lamp_below_camera : FixStatus::degenerate};
 }
 
-std::optional<Pose> compute_pose_from_coplanar_lamps(std::span<const Sighting> sightings) {
+std::optional<Pose> solve_for_coplanar_lamps(std::span<const Sighting> sightings) {
   const auto similarity = fit_similarity_transform(
       sightings.size(), [&](std::size_t i) { return sightings[i].z; },
       [&](std::size_t i) -> Eigen::Vector2d { return sightings[i].lamp_m.head<2>(); });
@@ -104,8 +104,7 @@ std::optional<Pose> compute_pose_from_coplanar_lamps(std::span<const Sighting> s
               std::atan2(c.y(), c.x())};
 }
 
-std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sighting, double z_m,
-                                                         double yaw_rad) {
+std::optional<Pose> solve_for_one_lamp(const Sighting& sighting, double z_m, double yaw_rad) {
   const double height_m = sighting.lamp_m.z() - z_m;
   if (!(height_m > 0)) return std::nullopt;
   const Eigen::Vector2d s =

@@ -41,13 +41,13 @@ struct TwoLampPoses {
 ///
 /// Lamps at different heights have two solutions if both are far from the image center and close
 /// together (|h z_2| > |D|); otherwise one. Returns none if the lamps coincide in the image.
-TwoLampPoses compute_two_lamp_poses(const Sighting& first, const Sighting& second);
+TwoLampPoses solve_for_two_lamps(const Sighting& first, const Sighting& second);
 
 /// Computes position and yaw from two or more lamps at one height, in closed form. The
 /// least-squares similarity p = s + c z gives H = |c|, g = arg c (the method of [19] in Chen and
 /// Guan). All lamps have equal weights. Returns std::nullopt if the lamps coincide in the image.
 /// @pre the lamps have equal heights; their mean is used
-std::optional<Pose> compute_pose_from_coplanar_lamps(std::span<const Sighting> sightings);
+std::optional<Pose> solve_for_coplanar_lamps(std::span<const Sighting> sightings);
 
 /// Poses of a camera that are initial values for least squares: `count` of them at the beginning of
 /// `poses`.
@@ -59,14 +59,13 @@ struct InitialLevelPoses {
 };
 
 /// Computes the poses from two or more lamps in closed form, exact without noise. Two lamps:
-/// compute_two_lamp_poses(). Lamps at one height: the similarity. Otherwise the solutions from the
+/// solve_for_two_lamps(). Lamps at one height: the similarity. Otherwise the solutions from the
 /// two lamps that are far apart in the image.
 InitialLevelPoses compute_initial_poses(std::span<const Sighting> sightings);
 
 /// Computes the position from one lamp if height and yaw are known (eq. 6 solved for s):
 ///   s = p - H e^{jg} z
 /// Returns std::nullopt if the lamp is not above the camera.
-std::optional<Pose> compute_pose_at_known_height_and_yaw(const Sighting& sighting, double z_m,
-                                                         double yaw_rad);
+std::optional<Pose> solve_for_one_lamp(const Sighting& sighting, double z_m, double yaw_rad);
 
 }  // namespace vlp

@@ -16,8 +16,8 @@ namespace {
 
 /// Returns the derivatives of the rotation by the two coordinates of an error.
 template <typename With>
-void add_rotation_derivatives(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
-                              Correction correction, With with_error) {
+void add_derivatives(std::vector<Eigen::Matrix3d>& turns, const Calibration& calibration,
+                     Correction correction, With with_error) {
   constexpr double step = 1e-5;  // central differences have errors of second order: 1e-10
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d error = step * Eigen::Vector2d::Unit(axis);
@@ -31,8 +31,8 @@ void add_rotation_derivatives(std::vector<Eigen::Matrix3d>& turns, const Calibra
 /// Returns the reduction of a covariance if the errors of these rows become known:
 ///   S_:P S_PP^-1 S_P:
 /// Directions in which S_PP has only rounding errors contribute zero.
-Eigen::MatrixXd compute_posterior_covariance(const Eigen::MatrixXd& covariance, Eigen::Index first,
-                                             Eigen::Index size) {
+Eigen::MatrixXd compute_posterior(const Eigen::MatrixXd& covariance, Eigen::Index first,
+                                  Eigen::Index size) {
   if (size == 0) return Eigen::MatrixXd::Zero(covariance.rows(), covariance.cols());
   if (first + size == covariance.rows()) return covariance;  // the last rows own the remainder
   const Eigen::MatrixXd columns = covariance.middleCols(first, size);
@@ -40,8 +40,8 @@ Eigen::MatrixXd compute_posterior_covariance(const Eigen::MatrixXd& covariance, 
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(size));
   const Eigen::MatrixXd scaled = columns * inverse_sd.asDiagonal();
-  const auto eigen = eigendecompose_symmetric_matrix(
-      Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
+  const auto eigen =
+      eigendecompose(Eigen::MatrixXd(inverse_sd.asDiagonal() * scaled.middleRows(first, size)));
   constexpr double rounding = 1e-12;
   const Eigen::ArrayXd values = eigen.values;
   const Eigen::VectorXd whitening =
@@ -59,22 +59,18 @@ Eigen::MatrixXd compute_posterior_covariance(const Eigen::MatrixXd& covariance, 
 
 CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration,
                            Correction correction)
-    : intrinsics_(count_intrinsics_with_covariance(calibration.camera)),
+    : intrinsics_(count_intrinsics(calibration.camera)),
       base_from_camera_(compute_level_from_camera_matrix(calibration, correction)),
       camera_from_base_(base_from_camera_.inverse()) {
   const bool turned = calibration.rotation_center &&
                       (correction == Correction::rotation || correction == Correction::all);
   const bool shifted = calibration.dispersion &&
                        (correction == Correction::dispersion || correction == Correction::all);
-  if (turned)
-    add_rotation_derivatives(rotation_derivatives_, calibration, correction,
-                             add_error_to_calibrated_zenith);
-  if (shifted)
-    add_rotation_derivatives(rotation_derivatives_, calibration, correction,
-                             add_error_to_calibrated_dispersion_offset);
+  if (turned) add_derivatives(rotation_derivatives_, calibration, correction, add_zenith_error);
+  if (shifted) add_derivatives(rotation_derivatives_, calibration, correction, add_offset_error);
   offset_ = intrinsics_ + (turned ? 2 : 0);
   const JointCovariance none, &joint = calibration.covariance ? *calibration.covariance : none;
-  const std::vector<Eigen::Index> rows = assign_covariance_rows(lamps, joint);
+  const std::vector<Eigen::Index> rows = assign_rows(lamps, joint);
   const auto is_known = [&](Eigen::Index row) { return rows[static_cast<std::size_t>(row)] >= 0; };
   const Eigen::Index size = std::ssize(rows);
   covariance_ = Eigen::MatrixXd::Zero(size, size);
@@ -108,8 +104,8 @@ CommonErrors::CommonErrors(std::span<const Lamp> lamps, const Calibration& calib
       std::ranges::any_of(lamps_, [](const LampErrors& lamp) { return lamp.variance_m2 > 0; });
 }
 
-std::vector<Eigen::Index> CommonErrors::assign_covariance_rows(std::span<const Lamp> lamps,
-                                                               const JointCovariance& joint) {
+std::vector<Eigen::Index> CommonErrors::assign_rows(std::span<const Lamp> lamps,
+                                                    const JointCovariance& joint) {
   std::vector<Eigen::Index> rows(static_cast<std::size_t>(num_shared_errors()), -1);
   const auto set_rows = [&](Eigen::Index first, Eigen::Index size, std::string_view parameter) {
     const auto row = joint.find_row(parameter);
@@ -117,8 +113,8 @@ std::vector<Eigen::Index> CommonErrors::assign_covariance_rows(std::span<const L
       rows[static_cast<std::size_t>(first + i)] = *row + i;
   };
   set_rows(0, intrinsics_, "fx");
-  if (has_zenith_errors()) set_rows(intrinsics_, 2, kZenithParameter);
-  if (has_dispersion_offset_errors()) set_rows(offset_, 2, kOffsetParameter);
+  if (has_zenith_uncertainty()) set_rows(intrinsics_, 2, kZenithParameter);
+  if (has_offset_errors()) set_rows(offset_, 2, kOffsetParameter);
   for (const Lamp& lamp : lamps) {
     LampErrors& errors = lamps_.emplace_back(
         LampErrors{{}, std::pow(lamp.sd_m.value_or(0), 2), lamp.sd_m.has_value()});
@@ -132,14 +128,14 @@ std::vector<Eigen::Index> CommonErrors::assign_covariance_rows(std::span<const L
   return rows;
 }
 
-Eigen::Matrix3d CommonErrors::lamp_position_covariance(std::size_t lamp) const {
+Eigen::Matrix3d CommonErrors::lamp_covariance(std::size_t lamp) const {
   const LampErrors& errors = lamps_[lamp];
   if (!errors.row) return errors.variance_m2 * Eigen::Matrix3d::Identity();
   return covariance_.block<3, 3>(*errors.row, *errors.row);
 }
 
 Eigen::Matrix3d CommonErrors::lamp_cross_covariance(std::size_t lamp, std::size_t other) const {
-  if (lamp == other) return lamp_position_covariance(lamp);
+  if (lamp == other) return lamp_covariance(lamp);
   const auto &row = lamps_[lamp].row, &column = lamps_[other].row;
   if (!row || !column) return Eigen::Matrix3d::Zero();
   return covariance_.block<3, 3>(*row, *column);
@@ -151,7 +147,7 @@ CommonErrors CommonErrors::isolate_error_source(CommonErrorSource part) const {
   CommonErrors one = *this;
   MatrixX remainder = 0.5 * (covariance_ + covariance_.transpose());  // to the last bit
   for (std::size_t i = 0;; ++i) {
-    one.covariance_ = compute_posterior_covariance(remainder, rows[i], rows[i + 1] - rows[i]);
+    one.covariance_ = compute_posterior(remainder, rows[i], rows[i + 1] - rows[i]);
     if (kCommonErrorSources[i] == part) break;
     remainder -= one.covariance_;
   }
@@ -165,11 +161,11 @@ CommonErrors CommonErrors::isolate_error_source(CommonErrorSource part) const {
   return one;
 }
 
-CommonErrors::RayJacobian CommonErrors::compute_ray_jacobian_wrt_errors(
-    const Eigen::Vector3d& ray_in_base, const Lens& lens) const {
+CommonErrors::RayJacobian CommonErrors::differentiate_ray(const Eigen::Vector3d& ray_in_base,
+                                                          const Lens& lens) const {
   RayJacobian effect = RayJacobian::Zero(3, num_shared_errors());
   const Eigen::Vector3d ray = camera_from_base_ * ray_in_base;
-  if (const auto seen = lens.project_point_with_jacobians(ray)) {
+  if (const auto seen = lens.project_with_jacobians(ray)) {
     // For a fixed pixel the ray moves within its plane of z.
     const Eigen::Matrix2d d_ray = -seen->d_pixel_d_point.leftCols<2>().inverse();
     const Eigen::Matrix<double, 3, 2> d_ray_in_base = base_from_camera_.leftCols<2>() * d_ray;
@@ -189,15 +185,15 @@ CommonErrors::GainMatrix<2> CommonErrors::compute_residual_gain(
   const Eigen::Matrix<double, 2, 3> by_ray =
       seen.whitened_pixel_from_ray * body_from_base / seen.depth_axis.dot(seen.ray);
   GainMatrix<2> gain(num_shared_errors());
-  gain.jacobian_wrt_shared = by_ray.lazyProduct(
-      compute_ray_jacobian_wrt_errors(body_from_base.transpose() * seen.ray, lens));
+  gain.jacobian_wrt_shared =
+      by_ray.lazyProduct(differentiate_ray(body_from_base.transpose() * seen.ray, lens));
   gain.add(lamps[index], linearized.jacobian.leftCols<3>());
   return gain;
 }
 
 template <int States>
-CommonErrors::GainMatrix<States> CommonErrors::compute_gain_from_errors_to_fix(
-    const Observations& observations, const BodyFix& fix) const {
+CommonErrors::GainMatrix<States> CommonErrors::compute_fix_gain(const Observations& observations,
+                                                                const BodyFix& fix) const {
   const EvaluatedState body(fix.state);
   const Eigen::Matrix<double, States, kBodyStates> covariance = fix.covariance.topRows<States>();
   GainMatrix<States> whole(num_shared_errors());
@@ -212,19 +208,18 @@ CommonErrors::GainMatrix<States> CommonErrors::compute_gain_from_errors_to_fix(
   return whole;
 }
 
-void CommonErrors::compute_residual_covariances(const Observations& observations,
-                                                const BodyState& state,
-                                                std::span<Matrix2> covariances) const {
+void CommonErrors::add_covariances(const Observations& observations, const BodyState& state,
+                                   std::span<Matrix2> covariances) const {
   const EvaluatedState body(state);
   for (std::size_t i = 0; i < covariances.size(); ++i) {
     const LinearizedObservation seen =
         linearize_observation(observations.sightings[i], body, observations.arm_m);
-    covariances[i] = propagate_covariance_to_fix(compute_residual_gain(observations, i, seen));
+    covariances[i] = propagate(compute_residual_gain(observations, i, seen));
   }
 }
 
 template <int States>
-Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::propagate_covariance_to_fix(
+Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::propagate(
     const GainMatrix<States>& gain) const {
   using SharedGain = typename GainMatrix<States>::SharedGain;
   using LampGain = typename GainMatrix<States>::LampGain;
@@ -236,7 +231,7 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::propagate_
   Covariance sum = with_shared.lazyProduct(jacobian_wrt_shared.transpose());
   for (std::size_t i = 0; i < gain.size; ++i) {
     // Half of the lamp's own errors, the shared errors, and those of the lamps before it.
-    LampGain other = 0.5 * jacobian_wrt_lamp[i] * lamp_position_covariance(gain.lamps[i]);
+    LampGain other = 0.5 * jacobian_wrt_lamp[i] * lamp_covariance(gain.lamps[i]);
     if (const auto& row = lamps_[gain.lamps[i]].row) {
       other += jacobian_wrt_shared.lazyProduct(covariance_.block(0, *row, n, 3));
     }
@@ -249,10 +244,9 @@ Eigen::Matrix<double, States, States, Eigen::DontAlign> CommonErrors::propagate_
   return sum;
 }
 
-double compute_expected_chi_squared_of_common_errors(const CommonErrors::Observations& observations,
-                                                     std::span<const Matrix2> residual_covariances,
-                                                     const BodyFix& fix,
-                                                     const BodyCovariance& common) {
+double compute_expected_chi_squared(const CommonErrors::Observations& observations,
+                                    std::span<const Matrix2> residual_covariances,
+                                    const BodyFix& fix, const BodyCovariance& common) {
   using Matrix = Eigen::Matrix<double, kBodyStates, kBodyStates>;
   const EvaluatedState body(fix.state);
   Matrix information = Matrix::Zero();
@@ -271,12 +265,11 @@ double compute_expected_chi_squared_of_common_errors(const CommonErrors::Observa
   return sum - ((2 * covariance.inverse() - information) * common).trace();
 }
 
-template CommonErrors::GainMatrix<4> CommonErrors::compute_gain_from_errors_to_fix(
+template CommonErrors::GainMatrix<4> CommonErrors::compute_fix_gain(
     const Observations& observations, const BodyFix& fix) const;
-template CommonErrors::GainMatrix<kBodyStates> CommonErrors::compute_gain_from_errors_to_fix(
+template CommonErrors::GainMatrix<kBodyStates> CommonErrors::compute_fix_gain(
     const Observations& observations, const BodyFix& fix) const;
-template Matrix4 CommonErrors::propagate_covariance_to_fix(const GainMatrix<4>& gain) const;
-template BodyCovariance CommonErrors::propagate_covariance_to_fix(
-    const GainMatrix<kBodyStates>& gain) const;
+template Matrix4 CommonErrors::propagate(const GainMatrix<4>& gain) const;
+template BodyCovariance CommonErrors::propagate(const GainMatrix<kBodyStates>& gain) const;
 
 }  // namespace vlp

@@ -49,12 +49,12 @@ class CommonErrors {
   CommonErrors(std::span<const Lamp> lamps, const Calibration& calibration, Correction correction);
 
   /// Returns true if the error of any calibrated quantity or lamp is known.
-  bool are_any_errors_known() const { return stated_; }
+  bool has_known_errors() const { return stated_; }
   /// Returns true if the errors of lens, zenith and every lamp of the map are known. Only then can
   /// a wrong lamp be identified by them.
-  bool are_lens_zenith_and_lamp_errors_known() const { return complete_; }
+  bool has_all_errors() const { return complete_; }
   /// Returns true if the errors of the part are known, or if the calibration lacks the part.
-  bool is_error_source_known_or_absent(CommonErrorSource part) const {
+  bool is_known_or_absent(CommonErrorSource part) const {
     return part_stated_[static_cast<std::size_t>(part)];
   }
   /// Returns one part of C, with the others taken as exact. The parts add up to C, and no part
@@ -72,8 +72,7 @@ class CommonErrors {
   /// Derivative of the ray of a pixel with respect to the shared errors, one column each. The ray
   /// is along the axes of the base, the camera frame after correction of its tilt.
   using RayJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
-  RayJacobian compute_ray_jacobian_wrt_errors(const Eigen::Vector3d& ray_in_base,
-                                              const Lens& lens) const;
+  RayJacobian differentiate_ray(const Eigen::Vector3d& ray_in_base, const Lens& lens) const;
 
   /// G: derivatives of the first `States` states of a fix, or of the residuals of an observation,
   /// with respect to the shared errors and to the errors of each lamp.
@@ -108,26 +107,25 @@ class CommonErrors {
   /// Returns the gain of the least-squares fix (estimate_body_state()): of (X, Y, Z, yaw), or of
   /// all states of a body (BodyIndex).
   template <int States>
-  GainMatrix<States> compute_gain_from_errors_to_fix(const Observations& observations,
-                                                     const BodyFix& fix) const;
+  GainMatrix<States> compute_fix_gain(const Observations& observations, const BodyFix& fix) const;
   /// Computes the covariance of the residuals of each observation from the common errors, in
   /// standard deviations of the pixel.
-  void compute_residual_covariances(const Observations& observations, const BodyState& state,
-                                    std::span<Matrix2> covariances) const;
+  void add_covariances(const Observations& observations, const BodyState& state,
+                       std::span<Matrix2> covariances) const;
   /// Returns G C G', the covariance of the states of a fix from the common errors, in the units of
   /// the states.
   template <int States>
-  Eigen::Matrix<double, States, States, Eigen::DontAlign> propagate_covariance_to_fix(
+  Eigen::Matrix<double, States, States, Eigen::DontAlign> propagate(
       const GainMatrix<States>& gain) const;
 
   /// Returns the joint covariance: intrinsics, zenith and offset, as far as they exist. Lamps with
   /// correlated errors follow, in the order of the map.
-  const MatrixX& joint_error_covariance() const { return covariance_; }
+  const MatrixX& joint_covariance() const { return covariance_; }
   Eigen::Index num_shared_errors() const { return intrinsics_ + std::ssize(rotation_derivatives_); }
 
  private:
-  bool has_zenith_errors() const { return offset_ > intrinsics_; }
-  bool has_dispersion_offset_errors() const { return num_shared_errors() > offset_; }
+  bool has_zenith_uncertainty() const { return offset_ > intrinsics_; }
+  bool has_offset_errors() const { return num_shared_errors() > offset_; }
   /// Errors of a lamp of the map. A large map has few lamps whose errors are correlated with
   /// others: those of JointCovariance have rows here.
   struct LampErrors {
@@ -141,10 +139,9 @@ class CommonErrors {
   GainMatrix<2> compute_residual_gain(const Observations& observations, std::size_t index,
                                       const LinearizedObservation& linearized) const;
   /// Returns the row in `joint` of each row of the covariance, -1 if it is unknown. Adds the lamps.
-  std::vector<Eigen::Index> assign_covariance_rows(std::span<const Lamp> lamps,
-                                                   const JointCovariance& joint);
+  std::vector<Eigen::Index> assign_rows(std::span<const Lamp> lamps, const JointCovariance& joint);
   /// Returns the covariance of a lamp's position, m^2; `lamp` is its index in the map.
-  Eigen::Matrix3d lamp_position_covariance(std::size_t lamp) const;
+  Eigen::Matrix3d lamp_covariance(std::size_t lamp) const;
   /// Returns the covariance between the positions of two lamps, m^2, by their indices in the map.
   Eigen::Matrix3d lamp_cross_covariance(std::size_t lamp, std::size_t other) const;
 
@@ -164,9 +161,8 @@ class CommonErrors {
 /// of the residuals and from their covariance `common` = G C G' of the states:
 ///   tr(R C R') = tr(W J_c C J_c') - tr((N + 2 P) common),   R = W^1/2 (J_c - J G)
 /// with N = J' W J and the information P of the priors.
-double compute_expected_chi_squared_of_common_errors(const CommonErrors::Observations& observations,
-                                                     std::span<const Matrix2> residual_covariances,
-                                                     const BodyFix& fix,
-                                                     const BodyCovariance& common);
+double compute_expected_chi_squared(const CommonErrors::Observations& observations,
+                                    std::span<const Matrix2> residual_covariances,
+                                    const BodyFix& fix, const BodyCovariance& common);
 
 }  // namespace vlp

@@ -12,20 +12,21 @@ namespace {
 
 const Eigen::Vector3d kNoArm = Eigen::Vector3d::Zero();
 
-std::optional<LampObservation> make_noise_free_observation(
-    const Eigen::Vector3d& lamp_m, const Lens& lens, const Eigen::Matrix3d& camera_from_level,
-    const Pose& level, double noise_px, const std::optional<RowClock>& row_clock) {
+std::optional<LampObservation> make_observation(const Eigen::Vector3d& lamp_m, const Lens& lens,
+                                                const Eigen::Matrix3d& camera_from_level,
+                                                const Pose& level, double noise_px,
+                                                const std::optional<RowClock>& row_clock) {
   const auto pixel = lens.project_point(camera_from_level * level_point_from_world(level, lamp_m));
   if (!pixel) return std::nullopt;
   const auto ray = lens.unproject_pixel(*pixel);
   if (!ray) return std::nullopt;
   const Eigen::Matrix3d level_from_camera = camera_from_level.transpose();
   const Eigen::Vector3d direction = level_from_camera * ray->direction;
-  const auto whitened = compute_whitened_pixel_jacobian_wrt_ray(
-      direction, level_from_camera * ray->d_direction_d_pixel, noise_px);
+  const auto whitened =
+      whiten_ray_jacobian(direction, level_from_camera * ray->d_direction_d_pixel, noise_px);
   if (!whitened) return std::nullopt;
   return LampObservation{lamp_m, direction.normalized(), *whitened, noise_px,
-                         row_clock ? row_clock->compute_pixel_readout_time_s(*pixel) : 0};
+                         row_clock ? row_clock->compute_readout_time_s(*pixel) : 0};
 }
 
 std::optional<Matrix4> compute_pose_covariance(const FrameObservations& frame,
@@ -39,11 +40,11 @@ std::optional<Matrix4> compute_pose_covariance(const FrameObservations& frame,
 std::optional<BodyFix> find_exact_fix(FrameObservations& frame, const BodyPrior& prior,
                                       const Pose& level) {
   const BodyProblem problem{kNoArm, prior};
-  if (!prior.is_motion_or_tilt_estimated())
+  if (!prior.is_motion_or_tilt_free())
     return estimate_body_state(frame.observations_span(), problem, {level, prior.mean.motion});
   // Exact observations neither contradict the fix nor fit a mirrored map: the limit has no effect.
   constexpr double residual_limit = 0.1;
-  const BodySolution found = estimate_body_state_robust(frame, problem, residual_limit);
+  const BodySolution found = estimate_robust(frame, problem, residual_limit);
   return found.status == FixStatus::ok ? std::optional(found.fix) : std::nullopt;
 }
 
@@ -59,8 +60,7 @@ std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> 
   BodyPoseBound limit;
   FrameObservations& frame = limit.frame;
   for (const Eigen::Vector3d& lamp_m : lamps_m) {
-    const auto seen =
-        make_noise_free_observation(lamp_m, lens, camera_from_level, level, noise_px, row_clock);
+    const auto seen = make_observation(lamp_m, lens, camera_from_level, level, noise_px, row_clock);
     if (!seen || !(lamp_m.z() > level.position_m.z())) return std::nullopt;
     frame.add_current(*seen, static_cast<int>(frame.size), std::numeric_limits<double>::infinity());
   }
@@ -69,7 +69,7 @@ std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> 
   limit.fix = *fix;
   limit.noise = fix->covariance.topLeftCorner<4, 4>();
   limit.motion = limit.roll_pitch = Matrix4::Zero();
-  if (!prior.is_motion_or_tilt_estimated()) return limit;
+  if (!prior.is_motion_or_tilt_free()) return limit;
   // The fix is at rest and level to rounding.
   limit.fix.state.motion = prior.mean.motion;
   BodyPrior level_prior = prior;
@@ -86,11 +86,10 @@ std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> 
   return limit;
 }
 
-std::optional<ErrorBudget> compute_fix_error_budget(std::span<const Eigen::Vector3d> lamps_m,
-                                                    const Lens& lens, const Pose& level,
-                                                    const ErrorSources& sources,
-                                                    const BodyPrior& prior,
-                                                    const std::optional<RowClock>& row_clock) {
+std::optional<ErrorBudget> compute_fix_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                              const Lens& lens, const Pose& level,
+                                              const ErrorSources& sources, const BodyPrior& prior,
+                                              const std::optional<RowClock>& row_clock) {
   const auto limit = compute_pose_crlb(lamps_m, lens, Eigen::Matrix3d::Identity(), level,
                                        sources.noise_px, prior, row_clock);
   if (!limit) return std::nullopt;

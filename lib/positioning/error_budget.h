@@ -78,10 +78,10 @@ struct ErrorBudget {
 /// order. If the tilt is estimated, an error of the calibrated tilt has almost no effect. Returns
 /// std::nullopt as compute_pose_crlb().
 /// @pre `row_clock` has a value if the prior leaves the motion free
-std::optional<ErrorBudget> compute_fix_error_budget(std::span<const Eigen::Vector3d> lamps_m,
-                                                    const Lens& lens, const Pose& level,
-                                                    const ErrorSources& sources,
-                                                    const BodyPrior& prior = {},
-                                                    const std::optional<RowClock>& row_clock = {});
+std::optional<ErrorBudget> compute_fix_budget(std::span<const Eigen::Vector3d> lamps_m,
+                                              const Lens& lens, const Pose& level,
+                                              const ErrorSources& sources,
+                                              const BodyPrior& prior = {},
+                                              const std::optional<RowClock>& row_clock = {});
 
 }  // namespace vlp

@@ -62,15 +62,15 @@ constexpr std::array<Entry, 13> kStatuses{{
      "a camera that moves needs row_time_s and readout in its calibration"},
 }};
 
-const Entry& find_status_entry(FixStatus status) {
+const Entry& get_status_entry(FixStatus status) {
   return kStatuses[static_cast<std::size_t>(status)];
 }
 
 }  // namespace
 
-std::string_view fix_status_name(FixStatus status) { return find_status_entry(status).name; }
+std::string_view fix_status_name(FixStatus status) { return get_status_entry(status).name; }
 std::string_view describe_fix_status(FixStatus status) {
-  return find_status_entry(status).explanation;
+  return get_status_entry(status).explanation;
 }
 
 }  // namespace vlp

@@ -16,7 +16,7 @@ constexpr double kMaxSmallTilt_rad = 0.05;
 bool has_fix_converged(const Fix& before, const Fix& after) {
   constexpr double tolerance_sd = 0.1;
   if (!after.has_succeeded()) return true;
-  const auto change = compute_state_difference(after.state, before.state).head<4>().array();
+  const auto change = subtract_states(after.state, before.state).head<4>().array();
   return (change.square() <=
           tolerance_sd * tolerance_sd * after.noise_covariance.diagonal().head<4>().array())
       .all();

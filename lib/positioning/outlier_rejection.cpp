@@ -97,7 +97,7 @@ bool is_consistent(const BodySolution& solution, const FrameObservations& frame,
 
 FrameObservations select_lamps(const FrameObservations& frame, const Agreeing& agreeing) {
   FrameObservations remaining = frame;
-  remaining.keep_only_selected_observations(agreeing);
+  remaining.keep_selected(agreeing);
   return remaining;
 }
 
@@ -109,8 +109,8 @@ FrameObservations mirror_lamp_positions(FrameObservations frame) {
 
 /// Finds the largest set of lamps that agree with a state of unknown roll and pitch, at rest. Every
 /// triple of lamps proposes its states.
-Agreeing find_majority_with_unknown_tilt(const FrameObservations& frame, const BodyProblem& problem,
-                                         double limit_m) {
+Agreeing select_tilted_majority(const FrameObservations& frame, const BodyProblem& problem,
+                                double limit_m) {
   constexpr std::size_t few = 12;
   const std::size_t n = frame.num_current, stride = n <= few ? 1 : n * n * n / (few * few * few);
   Agreement best;
@@ -119,8 +119,7 @@ Agreeing find_majority_with_unknown_tilt(const FrameObservations& frame, const B
     for (std::size_t j = i + 1; j < n; ++j) {
       for (std::size_t k = j + 1; k < n; ++k) {
         if (turn++ % stride != 0) continue;
-        const InitialStates initial_states =
-            compute_initial_body_states_from_three_lamps(frame, {i, j, k}, problem);
+        const InitialStates initial_states = solve_for_three_lamps(frame, {i, j, k}, problem);
         for (const BodyState& state : initial_states.list()) {
           const Agreement agreement(state, frame, problem, limit_m);
           if (agreement.is_better_than(best)) best = agreement;
@@ -134,8 +133,8 @@ Agreeing find_majority_with_unknown_tilt(const FrameObservations& frame, const B
 /// Finds the largest set of lamps that agree with a state with the inclination of the prior, at
 /// rest. Every pair of lamps proposes its states; of more than 64 lamps, a fixed selection of
 /// pairs.
-Agreeing find_majority_if_level(const FrameObservations& frame, const BodyProblem& problem,
-                                double limit_m) {
+Agreeing select_level_majority(const FrameObservations& frame, const BodyProblem& problem,
+                               double limit_m) {
   const Eigen::Matrix3d lean =
       level_rotation_from_inclination(problem.prior.mean.motion.inclination);
   const LevelSightings level(frame, lean);
@@ -144,10 +143,10 @@ Agreeing find_majority_if_level(const FrameObservations& frame, const BodyProble
   Agreement best;
   for (std::size_t i = 0; i < level.size; ++i) {
     for (std::size_t j = i + 1; j < level.size; j += stride) {
-      const TwoLampPoses pair = compute_two_lamp_poses(level.sightings[i], level.sightings[j]);
+      const TwoLampPoses pair = solve_for_two_lamps(level.sightings[i], level.sightings[j]);
       for (std::size_t k = 0; static_cast<int>(k) < pair.count; ++k) {
-        const Agreement agreement(make_body_state_from_camera_pose(pair.poses[k], problem, lean),
-                                  frame, problem, limit_m);
+        const Agreement agreement(make_body_state(pair.poses[k], problem, lean), frame, problem,
+                                  limit_m);
         if (agreement.is_better_than(best)) best = agreement;
       }
     }
@@ -156,8 +155,8 @@ Agreeing find_majority_if_level(const FrameObservations& frame, const BodyProble
 }
 
 /// Computes the fix of a majority of the lamps, and removes the others from the frame.
-BodySolution estimate_body_from_majority(FrameObservations& frame, const BodyProblem& problem,
-                                         double max_residual_fraction) {
+BodySolution estimate_majority(FrameObservations& frame, const BodyProblem& problem,
+                               double max_residual_fraction) {
   const BodySolution none{FixStatus::inconsistent};
   const double limit_m = compute_residual_limit(frame, max_residual_fraction);
   double latest_s = 0;
@@ -167,16 +166,15 @@ BodySolution estimate_body_from_majority(FrameObservations& frame, const BodyPro
   const double driven_m = 2 * std::sqrt(problem.prior.max_variance(kBodyVelocity, 2)) * latest_s;
   const bool is_tilt_unknown = is_roll_pitch_unknown(problem.prior);
   const std::size_t min_lamps = is_tilt_unknown ? 4 : 3;  // one more than propose a state
-  Agreeing agreeing = is_tilt_unknown
-                          ? find_majority_with_unknown_tilt(frame, problem, limit_m + driven_m)
-                          : find_majority_if_level(frame, problem, limit_m + driven_m);
+  Agreeing agreeing = is_tilt_unknown ? select_tilted_majority(frame, problem, limit_m + driven_m)
+                                      : select_level_majority(frame, problem, limit_m + driven_m);
   // The majority ignored motion: with estimated motion, rejected lamps may agree.
   constexpr int max_iterations = 3;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (agreeing.count() < min_lamps || 2 * agreeing.count() <= frame.size) return none;
     const FrameObservations remaining = select_lamps(frame, agreeing);
     if (remaining.num_current < 2) return none;
-    const BodySolution solution = estimate_body_state_from_all_lamps(remaining, problem);
+    const BodySolution solution = estimate_from_all(remaining, problem);
     if (solution.status != FixStatus::ok) return solution;
     const Agreeing now_agreeing = Agreement(solution.fix.state, frame, problem, limit_m).agreeing;
     if (now_agreeing == agreeing) {
@@ -191,9 +189,9 @@ BodySolution estimate_body_from_majority(FrameObservations& frame, const BodyPro
 
 }  // namespace
 
-BodySolution estimate_body_state_robust(FrameObservations& frame, const BodyProblem& problem,
-                                        double max_residual_fraction) {
-  const BodySolution all = estimate_body_state_from_all_lamps(frame, problem);
+BodySolution estimate_robust(FrameObservations& frame, const BodyProblem& problem,
+                             double max_residual_fraction) {
+  const BodySolution all = estimate_from_all(frame, problem);
   if (frame.size < 3) {
     const bool is_contradicted =
         all.status == FixStatus::ok && !is_within_prior(problem.prior, all.fix.state);
@@ -205,7 +203,7 @@ BodySolution estimate_body_state_robust(FrameObservations& frame, const BodyProb
   if (is_all_consistent && (all.status != FixStatus::ok || excess <= kMaxReducedChiSquared))
     return all;
   const FrameObservations mirror_frame = mirror_lamp_positions(frame);
-  const BodySolution mirror_image = estimate_body_state_from_all_lamps(mirror_frame, problem);
+  const BodySolution mirror_image = estimate_from_all(mirror_frame, problem);
   const bool is_mirrored =
       mirror_image.status == FixStatus::ok &&
       is_consistent(mirror_image, mirror_frame, problem, limit_m) &&
@@ -216,7 +214,7 @@ BodySolution estimate_body_state_robust(FrameObservations& frame, const BodyProb
   if (is_all_consistent && frame.num_current < frame.size) return {FixStatus::inconsistent};
   if (is_all_consistent) return all;
   if (frame.size < 4) return has_fix(all) ? BodySolution{FixStatus::inconsistent} : all;
-  const BodySolution majority = estimate_body_from_majority(frame, problem, max_residual_fraction);
+  const BodySolution majority = estimate_majority(frame, problem, max_residual_fraction);
   if (majority.status == FixStatus::inconsistent && !has_fix(all)) return all;
   return majority;
 }
@@ -291,7 +289,7 @@ class LinearizedFrame {
 
   static BodyVector solve(const Cholesky<kBodyStates>& factor,
                           const std::array<double, kBodyStates>& right) {
-    const auto solution = factor.solve_normal_equations(right);
+    const auto solution = factor.solve_system(right);
     return BodyVector::Map(solution.data());
   }
 
@@ -322,7 +320,7 @@ class LinearizedFrame {
 
 }  // namespace
 
-OutlierLamps find_outlier_lamps(std::span<const LampObservation> sightings,
+OutlierLamps flag_outlier_lamps(std::span<const LampObservation> sightings,
                                 std::span<const Matrix2> common, const BodyProblem& problem,
                                 const BodyFix& fix, bool are_all_errors_known) {
   constexpr double min_redundancy = 1.5;  // two, less the information of the priors
@@ -364,7 +362,7 @@ BodySolution reject_outlier_lamps(FrameObservations& frame, const OutlierLamps& 
   FrameObservations remaining = select_lamps(frame, ~outliers);
   const auto fix = estimate_body_state(remaining.observations_span(), problem, all.fix.state);
   if (!fix || !is_within_prior(problem.prior, fix->state) ||
-      !is_body_position_determined(remaining, problem.prior, *fix)) {
+      !is_position_determined(remaining, problem.prior, *fix)) {
     return all;
   }
   frame = remaining;

@@ -30,11 +30,11 @@ namespace vlp {
 /// If residuals below these limits exceed five standard deviations, and the mirror image fits a
 /// hundred times better, the status is `mirrored_map`, too.
 ///
-/// Additional statuses: those of estimate_body_state_from_all_lamps(), and
+/// Additional statuses: those of estimate_from_all(), and
 ///   inconsistent  height, velocity, yaw rate or roll and pitch differ from the prior by more than
 ///                 five standard deviations
-BodySolution estimate_body_state_robust(FrameObservations& frame, const BodyProblem& problem,
-                                        double max_residual_fraction);
+BodySolution estimate_robust(FrameObservations& frame, const BodyProblem& problem,
+                             double max_residual_fraction);
 
 /// Lamps of a frame that contradict the others, as indices: none, one or several.
 using OutlierLamps = std::bitset<kMaxSightings>;
@@ -52,11 +52,11 @@ using OutlierLamps = std::bitset<kMaxSightings>;
 /// Returns none without a majority, or if fewer than two degrees of freedom would remain.
 ///
 /// @param common  covariance of each residual from the common errors, in standard deviations
-OutlierLamps find_outlier_lamps(std::span<const LampObservation> sightings,
+OutlierLamps flag_outlier_lamps(std::span<const LampObservation> sightings,
                                 std::span<const Matrix2> common, const BodyProblem& problem,
                                 const BodyFix& fix, bool are_all_errors_known);
 
-/// Rejects the outliers of a frame (find_outlier_lamps()) and estimates the state again. Keeps
+/// Rejects the outliers of a frame (flag_outlier_lamps()) and estimates the state again. Keeps
 /// frame and solution if the other lamps do not determine a state within the prior.
 /// @pre all observations are from the current frame
 BodySolution reject_outlier_lamps(FrameObservations& frame, const OutlierLamps& outliers,

@@ -85,7 +85,7 @@ struct States {
   }
 
   /// Index of each estimated state among all states.
-  static constexpr std::array<int, kCount> estimated_state_indices() {
+  static constexpr std::array<int, kCount> estimated_indices() {
     std::array<int, kCount> all{0, 1, 2, 3};
     std::size_t next = 4;
     if (velocity) all[next++] = kBodyVelocity, all[next++] = kBodyVelocity + 1;
@@ -96,13 +96,13 @@ struct States {
   /// Position of each state among the estimated ones; 0 if it is not estimated.
   static constexpr std::array<std::size_t, kBodyStates> state_positions() {
     std::array<std::size_t, kBodyStates> all{};
-    constexpr auto indices = estimated_state_indices();
+    constexpr auto indices = estimated_indices();
     for (std::size_t i = 0; i < kCount; ++i) all[static_cast<std::size_t>(indices[i])] = i;
     return all;
   }
   /// Returns the derivatives of a prior with respect to the estimated states.
   static std::array<double, kCount> make_prior_row(const PriorTerm& prior) {
-    constexpr auto indices = estimated_state_indices();
+    constexpr auto indices = estimated_indices();
     std::array<double, kCount> row;
     for (std::size_t i = 0; i < kCount; ++i) row[i] = prior.row[indices[i]];
     return row;
@@ -134,7 +134,7 @@ LampResidual compute_lamp_residual(const LampObservation& sighting, const Eigen:
 }
 
 /// Returns the derivative of the lamp's pixel by q.
-Matrix23 d_pixel_d_lamp_in_body(const LampObservation& sighting, const LampResidual& residual) {
+Matrix23 d_pixel_d_lamp(const LampObservation& sighting, const LampResidual& residual) {
   return residual.inverse_depth *
          (sighting.whitened_pixel_from_ray + residual.value * sighting.depth_axis.transpose());
 }
@@ -155,7 +155,7 @@ struct Linearized : Normal<S::kCount> {
         lamps_ahead = false;
         return;
       }
-      const Matrix23 d_pixel_d_q = d_pixel_d_lamp_in_body(sighting, residual);
+      const Matrix23 d_pixel_d_q = d_pixel_d_lamp(sighting, residual);
       const Matrix23 d_pixel_d_level = d_pixel_d_q.lazyProduct(at.body_from_level);
       for (const int axis : {0, 1}) {
         const auto row = S::make_row(at, terms, sighting.time_s, d_pixel_d_q.row(axis),
@@ -203,7 +203,7 @@ BodyFix make_body_fix(const Linearized<S>& normal, const Cholesky<S::kCount>& fa
   fix.pixels_chi_squared = normal.pixels_chi_squared;
   fix.residual_px = std::sqrt(normal.sum_px2 / lamps);
   fix.redundancy = 2 * lamps - static_cast<double>(S::kCount);
-  constexpr auto indices = S::estimated_state_indices();
+  constexpr auto indices = S::estimated_indices();
   for (std::size_t i = 0; i < S::kCount; ++i) {
     const auto column = factor.compute_inverse_column(i);
     for (std::size_t k = 0; k < S::kCount; ++k) {
@@ -213,7 +213,7 @@ BodyFix make_body_fix(const Linearized<S>& normal, const Cholesky<S::kCount>& fa
   const PriorTerms priors = compute_prior_terms(prior, EvaluatedState(state));
   for (const PriorTerm& term : priors.list()) {
     const auto row = S::make_prior_row(term);
-    const auto gain = factor.solve_normal_equations(row);
+    const auto gain = factor.solve_system(row);
     fix.redundancy += std::inner_product(row.begin(), row.end(), gain.begin(), 0.0);
   }
   return fix;
@@ -225,7 +225,7 @@ std::optional<BodyFix> solve(std::span<const LampObservation> sightings, const B
   constexpr int max_iterations = 50, max_halvings = 60;
   // Near the minimum the sum of squares changes by less than it can be computed.
   constexpr double rounding = 1e-12;
-  constexpr auto indices = S::estimated_state_indices();
+  constexpr auto indices = S::estimated_indices();
   EvaluatedState at(start);
   Linearized<S> normal(sightings, problem, at);
   if (!normal.lamps_ahead) return std::nullopt;
@@ -233,7 +233,7 @@ std::optional<BodyFix> solve(std::span<const LampObservation> sightings, const B
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const Cholesky<S::kCount> factor(normal);
     if (!factor.is_positive) return std::nullopt;
-    const auto solution = factor.solve_normal_equations(normal.gradient);
+    const auto solution = factor.solve_system(normal.gradient);
     BodyVector step = BodyVector::Zero();
     for (std::size_t i = 0; i < S::kCount; ++i) step[indices[i]] = solution[i];
     if (!step.allFinite()) return std::nullopt;
@@ -261,7 +261,7 @@ std::optional<BodyFix> solve(std::span<const LampObservation> sightings, const B
 
 }  // namespace
 
-std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_jacobian_wrt_ray(
+std::optional<Eigen::Matrix<double, 2, 3>> whiten_ray_jacobian(
     const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px) {
   // M is the inverse of (d_ray_d_pixel, ray), without the last row, for a ray of unit length.
   const Eigen::Vector3d across_u = d_ray_d_pixel.col(1).cross(ray);
@@ -325,11 +325,10 @@ LinearizedObservation linearize_observation(const LampObservation& sighting,
                                             const Eigen::Vector3d& arm_m) {
   const auto lamp = linearize_lamp_position(sighting.lamp_m, sighting.time_s, body, arm_m);
   const LampResidual residual = compute_lamp_residual(sighting, lamp.q);
-  return {residual.value, d_pixel_d_lamp_in_body(sighting, residual).lazyProduct(lamp.jacobian)};
+  return {residual.value, d_pixel_d_lamp(sighting, residual).lazyProduct(lamp.jacobian)};
 }
 
-Eigen::Matrix<double, kBodyStates, 1> compute_state_difference(const BodyState& to,
-                                                               const BodyState& from) {
+Eigen::Matrix<double, kBodyStates, 1> subtract_states(const BodyState& to, const BodyState& from) {
   const BodyMotion &a = to.motion, &b = from.motion;
   BodyVector difference;
   difference << to.pose.position_m - from.pose.position_m,
@@ -353,7 +352,7 @@ PriorTerms compute_prior_terms(const BodyPrior& prior, const EvaluatedState& bod
     const bool is_fixed =
         state >= kBodyVelocity && !is_free[quantity[static_cast<std::size_t>(state)]];
     if (is_fixed || std::isinf(variance)) continue;
-    if (priors.size == 0) difference = compute_state_difference(prior.mean, body.state);
+    if (priors.size == 0) difference = subtract_states(prior.mean, body.state);
     PriorTerm& term = priors.terms[priors.size];
     term = {state, true, difference[state], BodyVector::Unit(state)};
     if (state == kBodyZ && !prior.height_point_m.isZero(0)) {
@@ -391,9 +390,8 @@ PriorTerms compute_prior_terms(const BodyPrior& prior, const EvaluatedState& bod
   return priors;
 }
 
-std::optional<double> compute_body_state_chi_squared(std::span<const LampObservation> sightings,
-                                                     const BodyProblem& problem,
-                                                     const BodyState& state) {
+std::optional<double> compute_chi_squared(std::span<const LampObservation> sightings,
+                                          const BodyProblem& problem, const BodyState& state) {
   const EvaluatedState at(state);
   double sum = 0;
   const PriorTerms priors = compute_prior_terms(problem.prior, at);
@@ -425,8 +423,8 @@ std::optional<BodyFix> estimate_body_state(std::span<const LampObservation> sigh
   return solvers[static_cast<std::size_t>(index)](sightings, problem, start);
 }
 
-void convert_covariance_to_image_noise(const FrameObservations& frame, const BodyProblem& problem,
-                                       BodyFix& fix) {
+void convert_to_image_noise(const FrameObservations& frame, const BodyProblem& problem,
+                            BodyFix& fix) {
   using Matrix = Eigen::Matrix<double, kBodyStates, kBodyStates>;
   const EvaluatedState body(fix.state);
   Matrix by_weights = Matrix::Zero(), by_noise = Matrix::Zero();

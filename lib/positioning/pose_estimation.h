@@ -58,7 +58,7 @@ struct BodyPrior : StatePrior {
   /// Returns true if velocity or yaw rate are estimated together with the pose.
   bool is_motion_estimated() const { return is_velocity_estimated() || is_yaw_rate_estimated(); }
   /// Returns true if velocity, yaw rate or roll and pitch are estimated together with the pose.
-  bool is_motion_or_tilt_estimated() const { return is_motion_estimated() || is_tilt_estimated(); }
+  bool is_motion_or_tilt_free() const { return is_motion_estimated() || is_tilt_estimated(); }
   /// Returns the largest variance of `count` states from `state` on.
   double max_variance(int state, int count) const {
     return covariance.diagonal().segment(state, count).maxCoeff();
@@ -146,14 +146,12 @@ struct PriorTerms {
 PriorTerms compute_prior_terms(const BodyPrior& prior, const EvaluatedState& body);
 
 /// Returns the difference of two states (BodyIndex).
-Eigen::Matrix<double, kBodyStates, 1> compute_state_difference(const BodyState& to,
-                                                               const BodyState& from);
+Eigen::Matrix<double, kBodyStates, 1> subtract_states(const BodyState& to, const BodyState& from);
 
 /// Computes the sum of the squared residuals of pixels and priors over their variances at `state`.
 /// Returns std::nullopt if a lamp is behind its ray.
-std::optional<double> compute_body_state_chi_squared(std::span<const LampObservation> sightings,
-                                                     const BodyProblem& problem,
-                                                     const BodyState& state);
+std::optional<double> compute_chi_squared(std::span<const LampObservation> sightings,
+                                          const BodyProblem& problem, const BodyState& state);
 
 /// Estimates the state by least squares over pixels and priors. Gauss-Newton from `start`; a step
 /// that does not reduce the sum of squares is halved. Returns std::nullopt if a lamp is behind its
@@ -166,7 +164,7 @@ std::optional<BodyFix> estimate_body_state(std::span<const LampObservation> sigh
 /// Replaces covariance and redundancy for the weights of the observations by those for the noise V
 /// of their pixels (FrameObservations::noise):
 ///   C + C D C,   tr(V) - 2 tr(C S) + tr(N (C + C D C)),   S = J' V J,   N = J' J,   D = S - N
-void convert_covariance_to_image_noise(const FrameObservations& frame, const BodyProblem& problem,
-                                       BodyFix& fix);
+void convert_to_image_noise(const FrameObservations& frame, const BodyProblem& problem,
+                            BodyFix& fix);
 
 }  // namespace vlp

@@ -44,7 +44,7 @@ struct LampObservation {
 
 /// Computes M of a pixel from its standard deviation and the derivative of its ray, which may have
 /// any length. Returns std::nullopt if the lens is not invertible there.
-std::optional<Eigen::Matrix<double, 2, 3>> compute_whitened_pixel_jacobian_wrt_ray(
+std::optional<Eigen::Matrix<double, 2, 3>> whiten_ray_jacobian(
     const Eigen::Vector3d& ray, const Eigen::Matrix<double, 3, 2>& d_ray_d_pixel, double sigma_px);
 
 /// Makes the observation of a normalized point z = (x/z, y/z) by a level camera. `d_pixel_d_z`
@@ -88,7 +88,7 @@ struct FrameObservations {
 
   /// Removes all observations except those in `kept`. The removed ones of the current frame count
   /// as rejected.
-  void keep_only_selected_observations(const std::bitset<kMaxSightings>& kept) {
+  void keep_selected(const std::bitset<kMaxSightings>& kept) {
     std::size_t next = 0, next_current = 0;
     for (std::size_t i = 0; i < size; ++i) {
       if (kept[i]) {

@@ -59,7 +59,7 @@ bool is_valid_sd(double value) { return std::isfinite(value) && value >= 0; }
 
 /// Returns true if covariances of states with a finite variance are equal on both sides of the
 /// diagonal.
-bool is_covariance_symmetric(const BodyCovariance& covariance) {
+bool is_symmetric(const BodyCovariance& covariance) {
   constexpr double tolerance = 1e-9;
   for (Eigen::Index i = 0; i < kBodyStates; ++i) {
     for (Eigen::Index k = 0; k < i; ++k) {
@@ -75,7 +75,7 @@ bool is_covariance_symmetric(const BodyCovariance& covariance) {
 /// Returns true if the covariance of a given prior is symmetric and positive definite.
 bool is_covariance_valid(const BodyPrior& prior) {
   const PriorTerms terms = compute_prior_terms(prior, EvaluatedState(BodyState()));
-  return is_covariance_symmetric(prior.covariance) &&
+  return is_symmetric(prior.covariance) &&
          std::ranges::all_of(terms.list(),
                              [](const PriorTerm& term) { return term.row.allFinite(); });
 }
@@ -84,7 +84,7 @@ bool is_covariance_valid(const BodyPrior& prior) {
 bool is_valid_prior(const BodyPrior& prior) {
   const auto variances = prior.covariance.diagonal().array();
   return (variances >= 0).all() && variances.tail<5>().isFinite().all() &&
-         compute_state_difference(prior.mean, {}).allFinite();
+         subtract_states(prior.mean, {}).allFinite();
 }
 
 bool are_values_valid(const Sensors& sensors) {
@@ -119,7 +119,7 @@ Eigen::Vector3d get_lamp_center(const std::vector<Lamp>& lamps) {
 
 /// Returns the horizontal distance of each lamp to the nearest other one; infinity if there is
 /// none.
-std::vector<double> compute_distances_to_nearest_lamp(const std::vector<Lamp>& lamps) {
+std::vector<double> list_nearest_distances(const std::vector<Lamp>& lamps) {
   std::vector<double> nearest_m(lamps.size(), std::numeric_limits<double>::infinity());
   std::vector<std::pair<Eigen::Vector2d, std::size_t>> sorted;
   sorted.reserve(lamps.size());
@@ -141,9 +141,8 @@ std::vector<double> compute_distances_to_nearest_lamp(const std::vector<Lamp>& l
 /// height on a fix of one lamp. With the horizontal positions d of the lamp from the body and c
 /// from the camera, and H its height above the camera, the effects are d yaw^2 / 2 and J c / H yaw
 /// height. J is a quarter turn.
-Matrix2 compute_second_order_covariance_of_one_lamp(const LampObservation& seen,
-                                                    const BodyProblem& problem,
-                                                    const BodyFix& fix) {
+Matrix2 expand_to_second_order(const LampObservation& seen, const BodyProblem& problem,
+                               const BodyFix& fix) {
   const EvaluatedState body(fix.state);
   const Eigen::Vector3d arm_m = body.body_from_level.transpose() * problem.arm_m;
   const Eigen::Vector3d from_body_m = seen.lamp_m - fix.state.pose.position_m;
@@ -191,7 +190,7 @@ class Positioner::Impl {
         unstated_sigma_px_(options.unstated_sigma_px),
         row_clock_(make_readout_clock(calibration.camera)) {
     for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
-    nearest_m_ = compute_distances_to_nearest_lamp(lamps_);
+    nearest_m_ = list_nearest_distances(lamps_);
     if (!(mount_.position_in_robot_m.allFinite() && std::isfinite(mount_.yaw_in_robot_rad))) {
       throw std::invalid_argument("the position of the camera on the robot is not finite");
     }
@@ -202,7 +201,7 @@ class Positioner::Impl {
     }
   }
 
-  bool are_lamps_below_camera() const { return lamps_below_camera_; }
+  bool is_above_lamps() const { return lamps_below_camera_; }
 
   Fix compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
                            std::span<const EarlierFrame> earlier) const {
@@ -219,7 +218,7 @@ class Positioner::Impl {
       status = make_observations(before.detections, -before.before_s, prior, frame);
     }
     if (status != FixStatus::ok) return make_fix_without_pose(status, unknown_lamps);
-    if (frame.size == 1) set_height_and_yaw_of_camera(sensors, prior);
+    if (frame.size == 1) set_height_and_yaw(sensors, prior);
     if (frame.size == 0 || (frame.size == 1 && std::isinf(prior.max_variance(kBodyZ, 2))))
       return make_fix_without_pose(FixStatus::too_few_lamps, unknown_lamps);
     const BodyMotion& motion = prior.mean.motion;
@@ -228,9 +227,9 @@ class Positioner::Impl {
     if (may_move && !row_clock_)
       return make_fix_without_pose(FixStatus::row_time_unknown, unknown_lamps);
     const BodyProblem problem{mount_.position_in_robot_m, prior};
-    BodySolution solution = estimate_body_state_robust(frame, problem, max_residual_fraction_);
+    BodySolution solution = estimate_robust(frame, problem, max_residual_fraction_);
     if (solution.status == FixStatus::ok && rejects_contradicting_lamps_)
-      reject_contradicting_lamps(frame, problem, solution);
+      reject_contradicting(frame, problem, solution);
     Fix fix = solution.status == FixStatus::ok ? make_consistent_fix(frame, problem, solution.fix)
                                                : make_fix_with_candidates(solution);
     fix.time_s = sensors.time_s;
@@ -250,7 +249,7 @@ class Positioner::Impl {
     constexpr int max_iterations = 20;
     constexpr double tolerance_s = 1e-12;
     if (!has_lamp(id)) return none;
-    const Lamp& lamp_in_map = lamps_[find_lamp_index_by_id(id)];
+    const Lamp& lamp_in_map = lamps_[require_lamp_index(id)];
     BodyState local = state;
     local.pose.position_m -= origin_m_;
     const EvaluatedState body(local);
@@ -259,9 +258,9 @@ class Positioner::Impl {
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
       const auto lamp =
           linearize_lamp_position(lamp_in_map.position_m, time_s, body, mount_.position_in_robot_m);
-      const auto seen = lens_.project_point_with_jacobians(camera_from_body * lamp.q);
+      const auto seen = lens_.project_with_jacobians(camera_from_body * lamp.q);
       if (!seen) return none;
-      const double read_s = row_clock_ ? row_clock_->compute_pixel_readout_time_s(seen->pixel) : 0;
+      const double read_s = row_clock_ ? row_clock_->compute_readout_time_s(seen->pixel) : 0;
       if (!(std::abs(read_s - time_s) > tolerance_s)) {
         // The readout time t depends on the pixel p: dp = d_pixel_d_q (J dx + dq/dt dt).
         const Eigen::Matrix<double, 2, 3> d_pixel_d_q = seen->d_pixel_d_point * camera_from_body;
@@ -277,7 +276,7 @@ class Positioner::Impl {
   }
 
   bool has_lamp(int id) const {
-    const std::size_t index = find_lamp_index_by_id(id);
+    const std::size_t index = require_lamp_index(id);
     return index < lamps_.size() && lamps_[index].id == id;
   }
 
@@ -308,7 +307,7 @@ class Positioner::Impl {
     return prior;
   }
 
-  void set_height_and_yaw_of_camera(const Sensors& sensors, BodyPrior& prior) const {
+  void set_height_and_yaw(const Sensors& sensors, BodyPrior& prior) const {
     if (!sensors.height_and_yaw) return;
     const HeightAndYaw& known = *sensors.height_and_yaw;
     prior.mean.pose = {{0, 0, known.z_m - origin_m_.z()}, known.yaw_rad - mount_.yaw_in_robot_rad};
@@ -341,11 +340,9 @@ class Positioner::Impl {
       if (!ray) return FixStatus::outside_lens;
       const Eigen::Vector3d direction = body_from_camera_ * ray->direction;
       const Eigen::Matrix<double, 3, 2> d_direction = body_from_camera_ * ray->d_direction_d_pixel;
-      const auto whitened =
-          compute_whitened_pixel_jacobian_wrt_ray(direction, d_direction, sigma_px);
+      const auto whitened = whiten_ray_jacobian(direction, d_direction, sigma_px);
       if (!whitened) return FixStatus::outside_lens;
-      const double read_s =
-          row_clock_ ? row_clock_->compute_pixel_readout_time_s(detection.pixel) : 0;
+      const double read_s = row_clock_ ? row_clock_->compute_readout_time_s(detection.pixel) : 0;
       frame.sightings[frame.size] = {lamp->position_m, direction.normalized(), *whitened, sigma_px,
                                      time_s + read_s};
       frame.noise[frame.size].setIdentity();
@@ -381,7 +378,7 @@ class Positioner::Impl {
     return true;
   }
 
-  std::size_t find_lamp_index_by_id(int id) const {
+  std::size_t require_lamp_index(int id) const {
     return static_cast<std::size_t>(std::ranges::lower_bound(lamps_, id, {}, &Lamp::id) -
                                     lamps_.begin());
   }
@@ -397,16 +394,15 @@ class Positioner::Impl {
                  impl.lens_,
                  impl.body_from_base_,
                  problem.arm_m} {
-      for (std::size_t i = 0; i < frame.size; ++i)
-        lamps[i] = impl.find_lamp_index_by_id(frame.ids[i]);
+      for (std::size_t i = 0; i < frame.size; ++i) lamps[i] = impl.require_lamp_index(frame.ids[i]);
     }
   };
 
   /// Rejects the lamps that noise and common errors do not explain.
-  void reject_contradicting_lamps(FrameObservations& frame, const BodyProblem& problem,
-                                  BodySolution& solution) const {
+  void reject_contradicting(FrameObservations& frame, const BodyProblem& problem,
+                            BodySolution& solution) const {
     constexpr std::size_t min_lamps = 4;  // fewer identify no outlier
-    const bool are_all_errors_known = common_.are_lens_zenith_and_lamp_errors_known();
+    const bool are_all_errors_known = common_.has_all_errors();
     const BodyFix& fix = solution.fix;
     if (frame.num_current < frame.size || frame.size < min_lamps ||
         !(are_all_errors_known || frame.noise_is_stated)) {
@@ -418,18 +414,17 @@ class Positioner::Impl {
     }
     std::array<Matrix2, max_lamps> common;
     const std::span<Matrix2> covariances(common.data(), frame.size);
-    compute_residual_covariances(frame, problem, fix, covariances);
-    const OutlierLamps outliers = find_outlier_lamps(frame.observations_span(), covariances,
+    add_covariances(frame, problem, fix, covariances);
+    const OutlierLamps outliers = flag_outlier_lamps(frame.observations_span(), covariances,
                                                      problem, fix, are_all_errors_known);
     solution = reject_outlier_lamps(frame, outliers, problem, solution);
   }
 
-  void compute_residual_covariances(const FrameObservations& frame, const BodyProblem& problem,
-                                    const BodyFix& fix, std::span<Matrix2> covariances) const {
+  void add_covariances(const FrameObservations& frame, const BodyProblem& problem,
+                       const BodyFix& fix, std::span<Matrix2> covariances) const {
     std::ranges::fill(covariances, Matrix2::Zero());
-    if (!common_.are_any_errors_known()) return;
-    common_.compute_residual_covariances(MapObservations(frame, problem, *this).errors, fix.state,
-                                         covariances);
+    if (!common_.has_known_errors()) return;
+    common_.add_covariances(MapObservations(frame, problem, *this).errors, fix.state, covariances);
   }
 
   /// Returns G C G', the covariance of the states from the common errors. Only that of the pose if
@@ -437,13 +432,12 @@ class Positioner::Impl {
   BodyCovariance compute_common_covariance(const FrameObservations& frame,
                                            const BodyProblem& problem, const BodyFix& fix) const {
     BodyCovariance common = BodyCovariance::Zero();
-    if (!common_.are_any_errors_known()) return common;
+    if (!common_.has_known_errors()) return common;
     const MapObservations observations(frame, problem, *this);
-    if (problem.prior.is_motion_or_tilt_estimated())
-      return common_.propagate_covariance_to_fix(
-          common_.compute_gain_from_errors_to_fix<kBodyStates>(observations.errors, fix));
-    common.topLeftCorner<4, 4>() = common_.propagate_covariance_to_fix(
-        common_.compute_gain_from_errors_to_fix<4>(observations.errors, fix));
+    if (problem.prior.is_motion_or_tilt_free())
+      return common_.propagate(common_.compute_fix_gain<kBodyStates>(observations.errors, fix));
+    common.topLeftCorner<4, 4>() =
+        common_.propagate(common_.compute_fix_gain<4>(observations.errors, fix));
     return common;
   }
 
@@ -454,19 +448,19 @@ class Positioner::Impl {
                           const BodyFix& solution) const {
     Fix fix = make_fix(frame, problem, solution, BodyCovariance::Zero());
     // Noise that is not stated is no contradiction.
-    const double scale = frame.noise_is_stated ? estimate_noise_scale_of_contradiction(fix) : 1;
+    const double scale = frame.noise_is_stated ? estimate_contradiction(fix) : 1;
     if (scale > 1) {
-      if (const auto covariance = find_covariance_with_tilt_or_motion(frame, problem, solution)) {
+      if (const auto covariance = find_wider_covariance(frame, problem, solution)) {
         fix = make_fix(frame, problem, solution, *covariance - solution.covariance);
       } else {
-        fix = make_fix_with_scaled_noise(frame, problem, solution, scale);
+        fix = make_fix_with_noise(frame, problem, solution, scale);
       }
     }
     return fix;
   }
 
-  Fix make_fix_with_scaled_noise(FrameObservations& frame, const BodyProblem& problem,
-                                 const BodyFix& solution, double scale) const {
+  Fix make_fix_with_noise(FrameObservations& frame, const BodyProblem& problem,
+                          const BodyFix& solution, double scale) const {
     for (std::size_t i = 0; i < frame.size; ++i) {
       frame.sightings[i].whitened_pixel_from_ray /= scale;
       frame.sightings[i].sigma_px *= scale;
@@ -482,9 +476,9 @@ class Positioner::Impl {
   /// Returns the covariance of a state if roll and pitch that were assumed to be exact, or the
   /// motion, are unknown instead: that of the state estimated with them, plus the square of the
   /// difference. Returns std::nullopt if neither explains the residuals.
-  std::optional<BodyCovariance> find_covariance_with_tilt_or_motion(const FrameObservations& frame,
-                                                                    const BodyProblem& problem,
-                                                                    const BodyFix& fix) const {
+  std::optional<BodyCovariance> find_wider_covariance(const FrameObservations& frame,
+                                                      const BodyProblem& problem,
+                                                      const BodyFix& fix) const {
     constexpr double tilt_sd_rad = 0.15, speed_sd_m_per_s = 1.5, yaw_rate_sd_rad_per_s = 1;
     const BodyPrior& known = problem.prior;
     BodyPrior tilted = known, moving = known;
@@ -498,7 +492,7 @@ class Positioner::Impl {
       if (!other || other->pixels_chi_squared > compute_chi_squared_limit(other->redundancy))
         return;
       const Eigen::Matrix<double, kBodyStates, 1> difference =
-          compute_state_difference(other->state, fix.state);
+          subtract_states(other->state, fix.state);
       const BodyCovariance covariance =
           other->covariance + BodyCovariance(difference * difference.transpose());
       found = found ? BodyCovariance(*found + covariance) : covariance;
@@ -530,22 +524,22 @@ class Positioner::Impl {
     const BodyCovariance common = compute_common_covariance(frame, problem, solution);
     Fix fix;
     fix.status = FixStatus::ok;
-    if (solution.pixels_chi_squared > solution.redundancy && common_.are_any_errors_known() &&
+    if (solution.pixels_chi_squared > solution.redundancy && common_.has_known_errors() &&
         solution.redundancy > kMinRedundancy) {
       std::array<Matrix2, max_lamps> covariances;
-      compute_residual_covariances(frame, problem, solution, {covariances.data(), frame.size});
-      fix.common_chi_squared = compute_expected_chi_squared_of_common_errors(
-          MapObservations(frame, problem, *this).errors, {covariances.data(), frame.size}, solution,
-          common);
+      add_covariances(frame, problem, solution, {covariances.data(), frame.size});
+      fix.common_chi_squared =
+          compute_expected_chi_squared(MapObservations(frame, problem, *this).errors,
+                                       {covariances.data(), frame.size}, solution, common);
     }
-    if (!frame.is_weighted_by_noise) convert_covariance_to_image_noise(frame, problem, solution);
+    if (!frame.is_weighted_by_noise) convert_to_image_noise(frame, problem, solution);
     fix.redundancy = solution.redundancy > kMinRedundancy ? solution.redundancy : 0;
     fix.chi_squared = solution.pixels_chi_squared;
     fix.state = solution.state;
     fix.noise_covariance = solution.covariance;
     if (frame.size == 1) {
       fix.noise_covariance.topLeftCorner<2, 2>() +=
-          compute_second_order_covariance_of_one_lamp(frame.sightings[0], problem, solution);
+          expand_to_second_order(frame.sightings[0], problem, solution);
     }
     fix.covariance = fix.noise_covariance + common + excess;
     fix.state.pose.position_m += origin_m_;
@@ -581,25 +575,24 @@ Positioner::Positioner(const LampMap& map, const Calibration& calibration,
 
 Fix Positioner::compute_position_fix(std::span<const Detection> detections,
                                      const Sensors& sensors) const noexcept {
-  const bool below = impl_->are_lamps_below_camera();
+  const bool below = impl_->is_above_lamps();
   return turn_over_if(below,
                       impl_->compute_position_fix(detections, turn_over_if(below, sensors), {}));
 }
 
 Fix Positioner::compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
                                      std::span<const EarlierFrame> earlier) const noexcept {
-  const bool below = impl_->are_lamps_below_camera();
+  const bool below = impl_->is_above_lamps();
   return turn_over_if(
       below, impl_->compute_position_fix(detections, turn_over_if(below, sensors), earlier));
 }
 
 Eigen::Matrix3d Positioner::compute_level_from_camera(const Inclination& inclination) const {
-  return impl_->compute_level_from_camera(
-      turn_over_if(impl_->are_lamps_below_camera(), inclination));
+  return impl_->compute_level_from_camera(turn_over_if(impl_->is_above_lamps(), inclination));
 }
 
 LampProjection Positioner::project_lamp(int lamp, const BodyState& state) const noexcept {
-  const bool below = impl_->are_lamps_below_camera();
+  const bool below = impl_->is_above_lamps();
   return turn_over_if(below, impl_->project_lamp(lamp, turn_over_if(below, state)));
 }
 

@@ -17,7 +17,7 @@ namespace {
 bool has_redundancy(const Fix& fix) { return fix.has_succeeded() && fix.redundancy > 0; }
 
 /// Returns the median of chi_squared over its degrees of freedom.
-double compute_median_reduced_chi_squared(std::span<const Fix> fixes) {
+double compute_median_chi_squared(std::span<const Fix> fixes) {
   std::vector<double> ratios;
   for (const Fix& fix : fixes) {
     if (has_redundancy(fix)) ratios.push_back(fix.chi_squared / fix.redundancy);
@@ -30,10 +30,10 @@ double compute_median_reduced_chi_squared(std::span<const Fix> fixes) {
 
 }  // namespace
 
-ResidualSums sum_squared_residuals_of_fixes(std::span<const Fix> fixes) {
+ResidualSums sum_fix_residuals(std::span<const Fix> fixes) {
   // Five standard deviations of the others: no fix of normal noise, but one with a wrong lamp.
   constexpr double max_ratio = 25;
-  const double max_reduced = max_ratio * compute_median_reduced_chi_squared(fixes);
+  const double max_reduced = max_ratio * compute_median_chi_squared(fixes);
   ResidualSums sums;
   for (const Fix& fix : fixes) {
     if (!has_redundancy(fix) || fix.chi_squared > max_reduced * fix.redundancy) continue;
@@ -43,7 +43,7 @@ ResidualSums sum_squared_residuals_of_fixes(std::span<const Fix> fixes) {
   return sums;
 }
 
-std::optional<double> estimate_pixel_noise_px(const ResidualSums& sums) {
+std::optional<double> estimate_noise_px(const ResidualSums& sums) {
   if (!(sums.degrees_of_freedom > 0)) return std::nullopt;
   return std::clamp(std::sqrt(sums.squares_px2 / sums.degrees_of_freedom), kMinSigma_px,
                     kMaxSigma_px);
@@ -53,7 +53,7 @@ double compute_chi_squared_limit(double degrees_of_freedom) {
   return compute_chi_squared_bound(kSigmasOfOneInTenThousand, std::max(1.0, degrees_of_freedom));
 }
 
-double estimate_noise_scale_of_contradiction(const Fix& fix) {
+double estimate_contradiction(const Fix& fix) {
   const double noise_chi_squared = fix.chi_squared - 2 * fix.common_chi_squared;
   if (noise_chi_squared <= compute_chi_squared_limit(fix.redundancy)) return 1;
   return std::sqrt(noise_chi_squared / std::max(1.0, fix.redundancy));

@@ -19,13 +19,13 @@ struct ResidualSums {
 
 /// Sums the residuals of fixes. Ignores fixes without redundancy, and those whose reduced
 /// chi-squared exceeds 25 times the median.
-ResidualSums sum_squared_residuals_of_fixes(std::span<const Fix> fixes);
+ResidualSums sum_fix_residuals(std::span<const Fix> fixes);
 
 /// Estimates the standard deviation of a pixel per axis from the residuals:
 ///   sqrt(sum of squared residuals / degrees of freedom)
 /// Errors of calibration and lamp map count as noise. Clamped to [kMinSigma_px, kMaxSigma_px].
 /// Returns std::nullopt without redundancy.
-std::optional<double> estimate_pixel_noise_px(const ResidualSums& sums);
+std::optional<double> estimate_noise_px(const ResidualSums& sums);
 
 /// Returns the 1e-4 bound of chi-squared; that of one degree of freedom for fewer.
 double compute_chi_squared_limit(double degrees_of_freedom);
@@ -34,6 +34,6 @@ double compute_chi_squared_limit(double degrees_of_freedom);
 /// noise: if chi-squared exceeds its 1e-4 bound. Otherwise returns 1 (Birge ratio; Birge 1932,
 /// Phys. Rev. 40, 207). Twice the expectation of the errors of calibration and lamp map is
 /// attributed to them, since fixes share one realization of these.
-double estimate_noise_scale_of_contradiction(const Fix& fix);
+double estimate_contradiction(const Fix& fix);
 
 }  // namespace vlp

@@ -14,7 +14,7 @@ struct RowClock {
   double row_time_s, middle_row;
   Readout readout;
 
-  double compute_pixel_readout_time_s(const Eigen::Vector2d& pixel) const {
+  double compute_readout_time_s(const Eigen::Vector2d& pixel) const {
     return row_time_s * ((readout == Readout::rows ? pixel.y() : pixel.x()) - middle_row);
   }
   Eigen::RowVector2d d_time_d_pixel() const {

@@ -14,7 +14,7 @@ namespace {
 
 /// Returns a real root of x^3 + b x^2 + c x + d. Of three roots, approximately the one farthest
 /// from the others, where the cubic is steep.
-double find_steep_cubic_root(double b, double c, double d) {
+double compute_steep_root(double b, double c, double d) {
   const double inflection = -b / 3;
   const double slope = c - b * b / 3;  // at the inflection
   const double value = d + inflection * (c + inflection * (b + inflection));
@@ -39,8 +39,8 @@ double find_steep_cubic_root(double b, double c, double d) {
 }
 
 /// Returns v^T A w for symmetric A.
-double evaluate_bilinear_form(const Eigen::Matrix3d& a, const Eigen::Vector3d& v,
-                              const Eigen::Vector3d& w) {
+double evaluate_bilinear(const Eigen::Matrix3d& a, const Eigen::Vector3d& v,
+                         const Eigen::Vector3d& w) {
   return v.dot(a * w);
 }
 
@@ -90,7 +90,7 @@ Cones make_cones(const std::array<Eigen::Vector3d, 3>& points_m,
 
 /// Refines the distances by Newton steps on the three equations. Keeps them if these lead far away,
 /// as near two solutions that have just vanished.
-void refine_distances_by_newton(const Cones& cones, Eigen::Vector3d& distances) {
+void refine_by_newton(const Cones& cones, Eigen::Vector3d& distances) {
   constexpr double max_change = 0.1;
   const Eigen::Vector3d start = distances;
   for (int i = 0; i < 3; ++i) {
@@ -123,8 +123,8 @@ Eigen::Matrix3d compute_point_frame(const Eigen::Vector3d& p0, const Eigen::Vect
 
 }  // namespace
 
-ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 3>& points_m,
-                                              const std::array<Eigen::Vector3d, 3>& rays) {
+ThreeLampPoses solve_three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
+                                      const std::array<Eigen::Vector3d, 3>& rays) {
   ThreeLampPoses found;
   const Cones cones = make_cones(points_m, rays);
   Eigen::Matrix3d first = cones.a12 * cones.m01 - cones.a01 * cones.m12;
@@ -137,7 +137,7 @@ ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 
   const double quadratic = adj2.cwiseProduct(first).sum();
   const double linear = adj1.cwiseProduct(second).sum();
   const double constant = adj1.cwiseProduct(first).sum() / 3;
-  const double x = find_steep_cubic_root(quadratic / cubic, linear / cubic, constant / cubic);
+  const double x = compute_steep_root(quadratic / cubic, linear / cubic, constant / cubic);
   if (!std::isfinite(x)) return found;
   std::array<Eigen::Vector3d, 2> lines;
   const int count = split_degenerate_conic(first + x * second, lines);
@@ -147,9 +147,8 @@ ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 
     // Two directions span the line; the conic along a + s b is a quadratic in s.
     const Eigen::Vector3d line = lines[static_cast<std::size_t>(i)].normalized();
     const Eigen::Vector3d a = line.unitOrthogonal(), b = line.cross(a);
-    const double faa = evaluate_bilinear_form(second, a, a),
-                 fab = evaluate_bilinear_form(second, a, b),
-                 fbb = evaluate_bilinear_form(second, b, b);
+    const double faa = evaluate_bilinear(second, a, a), fab = evaluate_bilinear(second, a, b),
+                 fbb = evaluate_bilinear(second, b, b);
     const double discriminant = fab * fab - faa * fbb;
     // Noise may remove two solutions; the point between them is an initial value close to both.
     constexpr double near = 0.5;
@@ -162,11 +161,11 @@ ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 
       if (found.count == 4) break;
       const Eigen::Vector3d towards = ratio.sum() < 0 ? Eigen::Vector3d(-ratio) : ratio;
       if (!(towards.minCoeff() > 0)) continue;
-      const double scale = evaluate_bilinear_form(cones.m01, towards, towards) +
-                           evaluate_bilinear_form(cones.m02, towards, towards) +
-                           evaluate_bilinear_form(cones.m12, towards, towards);
+      const double scale = evaluate_bilinear(cones.m01, towards, towards) +
+                           evaluate_bilinear(cones.m02, towards, towards) +
+                           evaluate_bilinear(cones.m12, towards, towards);
       Eigen::Vector3d distances = std::sqrt((cones.a01 + cones.a02 + cones.a12) / scale) * towards;
-      refine_distances_by_newton(cones, distances);
+      refine_by_newton(cones, distances);
       if (!(distances.minCoeff() > 0) || !distances.allFinite()) continue;
       const std::array<Eigen::Vector3d, 3> seen{distances[0] * rays[0], distances[1] * rays[1],
                                                 distances[2] * rays[2]};

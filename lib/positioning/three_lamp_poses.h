@@ -31,7 +31,7 @@ struct ThreeLampPoses {
 /// noise, returns the point between them, which fits the rays only approximately. Returns none for
 /// collinear points. Source: Haralick et al., "Review and Analysis of Solutions of the Three Point
 /// Perspective Pose Estimation Problem", 1994, compares this and other methods.
-ThreeLampPoses compute_poses_from_three_lamps(const std::array<Eigen::Vector3d, 3>& points_m,
-                                              const std::array<Eigen::Vector3d, 3>& rays);
+ThreeLampPoses solve_three_lamp_poses(const std::array<Eigen::Vector3d, 3>& points_m,
+                                      const std::array<Eigen::Vector3d, 3>& rays);
 
 }  // namespace vlp

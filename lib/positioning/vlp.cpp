@@ -37,7 +37,7 @@ static_assert(VLP_MAX_LAMPS == Positioner::max_lamps);
 /// An array without a destructor, since a thread may read it while it ends.
 thread_local std::array<char, 1024> last_error;
 
-std::int32_t set_error_and_return_code(std::int32_t code, std::string_view message) {
+std::int32_t set_error(std::int32_t code, std::string_view message) {
   const auto length = std::min(message.size(), last_error.size() - 1);
   std::copy_n(message.begin(), length, last_error.begin());
   last_error[length] = '\0';
@@ -103,7 +103,7 @@ void copy_by_rows(const Matrix& from, double* rows) {
   Eigen::Map<Eigen::Matrix<double, num_rows, kBodyStates, Eigen::RowMajor>>{rows} = from;
 }
 
-void copy_fix_to_c_struct(const Fix& from, vlp_fix& fix) {
+void copy_fix(const Fix& from, vlp_fix& fix) {
   fix.status = static_cast<std::int32_t>(from.status);
   fix.unknown_lamps = from.unknown_lamps;
   fix.num_candidates = from.num_candidates;
@@ -127,15 +127,15 @@ std::int32_t set_error_from_exception() {
   try {
     throw;
   } catch (const InputError& error) {
-    return set_error_and_return_code(VLP_BAD_FILE, error.what());
+    return set_error(VLP_BAD_FILE, error.what());
   } catch (const std::invalid_argument& error) {
-    return set_error_and_return_code(VLP_BAD_ARGUMENT, error.what());
+    return set_error(VLP_BAD_ARGUMENT, error.what());
   } catch (const std::bad_alloc&) {
-    return set_error_and_return_code(VLP_NO_MEMORY, "there is not enough memory");
+    return set_error(VLP_NO_MEMORY, "there is not enough memory");
   } catch (const std::exception& error) {
-    return set_error_and_return_code(VLP_FAILED, error.what());
+    return set_error(VLP_FAILED, error.what());
   } catch (...) {
-    return set_error_and_return_code(VLP_FAILED, "an unknown exception");
+    return set_error(VLP_FAILED, "an unknown exception");
   }
 }
 
@@ -180,15 +180,13 @@ std::int32_t detect_in_image(const vlp_positioner* positioner, const vlp_image* 
   if (count != nullptr) *count = 0;
   if (positioner == nullptr || image == nullptr || count == nullptr ||
       (detections == nullptr && capacity > 0)) {
-    return set_error_and_return_code(VLP_BAD_ARGUMENT, "a pointer is null");
+    return set_error(VLP_BAD_ARGUMENT, "a pointer is null");
   }
   if (!positioner->detector) {
-    return set_error_and_return_code(
-        VLP_ROW_TIME_UNKNOWN,
-        "the calibration has no row_time_s, which is needed to identify lamps");
+    return set_error(VLP_ROW_TIME_UNKNOWN,
+                     "the calibration has no row_time_s, which is needed to identify lamps");
   }
-  if (!positioner->room_error.empty())
-    return set_error_and_return_code(VLP_BAD_FILE, positioner->room_error);
+  if (!positioner->room_error.empty()) return set_error(VLP_BAD_FILE, positioner->room_error);
   try {
     const std::vector<Detection> seen = detect(*positioner->detector, make_image_view(*image));
     for (std::size_t i = 0; i < std::min(seen.size(), capacity); ++i) {
@@ -197,8 +195,7 @@ std::int32_t detect_in_image(const vlp_positioner* positioner, const vlp_image* 
     }
     *count = seen.size();
     if (seen.size() <= capacity) return VLP_OK;
-    return set_error_and_return_code(VLP_TOO_SMALL,
-                                     "the image shows " + std::to_string(seen.size()) + " lamps");
+    return set_error(VLP_TOO_SMALL, "the image shows " + std::to_string(seen.size()) + " lamps");
   } catch (...) {
     return set_error_from_exception();
   }
@@ -217,21 +214,19 @@ int32_t vlp_open(const char* lamps_yaml, const char* calibration_yaml, const vlp
 int32_t vlp_open_room(const char* lamps_yaml, const char* room, const char* calibration_yaml,
                       const vlp_options* options, vlp_positioner** positioner) {
   using namespace vlp;
-  if (positioner == nullptr)
-    return set_error_and_return_code(VLP_BAD_ARGUMENT, "positioner is a null pointer");
+  if (positioner == nullptr) return set_error(VLP_BAD_ARGUMENT, "positioner is a null pointer");
   *positioner = nullptr;
   if (lamps_yaml == nullptr || calibration_yaml == nullptr) {
-    return set_error_and_return_code(VLP_BAD_ARGUMENT, "the name of a file is a null pointer");
+    return set_error(VLP_BAD_ARGUMENT, "the name of a file is a null pointer");
   }
   try {
-    const LampMapFile lamps = read_lamps_and_room_names(lamps_yaml, room != nullptr ? room : "");
+    const LampMapFile lamps = read_lamps_and_rooms(lamps_yaml, room != nullptr ? room : "");
     const Calibration calibration = read_calibration(calibration_yaml);
     const PositionerOptions chosen =
         options != nullptr ? convert_options(*options) : PositionerOptions();
     std::optional<LampDetector> detector;
     if (calibration.camera.row_time_s) detector.emplace(lamps.map, calibration);
-    std::string room_error =
-        explain_why_room_must_be_chosen(lamps, "the argument room of vlp_open_room()");
+    std::string room_error = explain_room_choice(lamps, "the argument room of vlp_open_room()");
     if (!room_error.empty()) room_error = InputError(lamps_yaml, room_error).what();
     *positioner = new vlp_positioner{Positioner(lamps.map, calibration, chosen),
                                      std::move(detector), std::move(room_error)};
@@ -255,7 +250,7 @@ int32_t vlp_locate_image(const vlp_positioner* positioner, const vlp_image* imag
                          const vlp_sensors* sensors, vlp_detection* detections, size_t capacity,
                          size_t* count, vlp_fix* fix) {
   using namespace vlp;
-  if (fix == nullptr) return set_error_and_return_code(VLP_BAD_ARGUMENT, "a pointer is null");
+  if (fix == nullptr) return set_error(VLP_BAD_ARGUMENT, "a pointer is null");
   *fix = {};
   if (sensors != nullptr) fix->stamp = sensors->stamp;
   const std::int32_t code = detect_in_image(
@@ -263,7 +258,7 @@ int32_t vlp_locate_image(const vlp_positioner* positioner, const vlp_image* imag
       [&](const auto& detector, const ImageView& view) {
         const Sensors known = sensors != nullptr ? convert_sensors(*sensors) : Sensors();
         ImageFix found = locate_camera_in_image(positioner->positioner, detector, view, known);
-        copy_fix_to_c_struct(found.fix, *fix);
+        copy_fix(found.fix, *fix);
         return std::move(found.detections);
       });
   if (code != VLP_OK) {
@@ -305,9 +300,9 @@ int32_t vlp_locate_with_earlier(const vlp_positioner* positioner, const vlp_dete
   }
   const Sensors known = sensors != nullptr ? convert_sensors(*sensors) : Sensors();
   const Positioner& with = positioner->positioner;
-  copy_fix_to_c_struct(frames > 0 ? with.compute_position_fix(frame, known, {before.data(), frames})
-                                  : with.compute_position_fix(frame, known),
-                       *fix);
+  copy_fix(frames > 0 ? with.compute_position_fix(frame, known, {before.data(), frames})
+                      : with.compute_position_fix(frame, known),
+           *fix);
   return fix->status;
 }
 

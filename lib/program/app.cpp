@@ -34,8 +34,7 @@ class PrintableMessage : public spdlog::custom_flag_formatter {
  public:
   void format(const spdlog::details::log_msg& message, const std::tm&,
               spdlog::memory_buf_t& line) override {
-    const std::string text =
-        escape_text_for_single_line({message.payload.data(), message.payload.size()});
+    const std::string text = escape_for_line({message.payload.data(), message.payload.size()});
     line.append(text.data(), text.data() + text.size());
   }
   std::unique_ptr<custom_flag_formatter> clone() const override {
@@ -103,7 +102,7 @@ std::string describe_command_problem(const CLI::App& app) {
 }
 
 /// Discards everything printed to stdout. The descriptor stays open for `--output /dev/stdout`.
-bool redirect_stdout_to_null() {
+bool discard_stdout() {
   std::FILE* nowhere = std::fopen("/dev/null", "w");
   if (nowhere == nullptr) return false;
   stdout = nowhere;
@@ -135,14 +134,14 @@ int count_cpu_cores() {
 CLI::Validator make_finite_validator() {
   return make_number_validator("finite", [](double) { return true; });
 }
-CLI::Validator make_finite_positive_validator() {
+CLI::Validator make_positive_validator() {
   return make_number_validator("finite positive", [](double value) { return value > 0; });
 }
-CLI::Validator make_finite_non_negative_validator() {
+CLI::Validator make_non_negative_validator() {
   return make_number_validator("finite and not negative", [](double value) { return value >= 0; });
 }
 
-CLI::Validator make_file_extension_validator(const std::string& ending) {
+CLI::Validator make_extension_validator(const std::string& ending) {
   return make_ending_validator({ending}, "the file's name should end in " + ending);
 }
 
@@ -155,7 +154,7 @@ void add_threads_option(CLI::App& app, int& threads, const std::string& descript
       ->check(CLI::Range(1, 1024));
 }
 
-void check_output_is_not_input(const std::string& output, const std::vector<std::string>& inputs) {
+void check_output_is_no_input(const std::string& output, const std::vector<std::string>& inputs) {
   for (const std::string& input : inputs) {
     std::error_code missing;
     if (std::filesystem::equivalent(output, input, missing)) {
@@ -164,12 +163,11 @@ void check_output_is_not_input(const std::string& output, const std::vector<std:
   }
 }
 
-void check_output_files_are_distinct(
-    const std::vector<std::pair<std::string, std::string>>& outputs,
-    const std::vector<std::string>& inputs) {
+void check_outputs_distinct(const std::vector<std::pair<std::string, std::string>>& outputs,
+                            const std::vector<std::string>& inputs) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     const auto& [option, file] = outputs[i];
-    check_output_is_not_input(file, inputs);
+    check_output_is_no_input(file, inputs);
     for (std::size_t k = 0; k < i; ++k) {
       if (!are_same_file(file, outputs[k].second)) continue;
       throw std::invalid_argument(
@@ -191,7 +189,7 @@ void keep_freed_memory() {
 
 }  // namespace
 
-std::string find_option_value(int argc, char** argv,
+std::string read_option_value(int argc, char** argv,
                               std::initializer_list<std::string_view> names) {
   for (int i = 1; i < argc; ++i) {
     for (const std::string_view name : names) {
@@ -209,8 +207,8 @@ std::string find_option_value(int argc, char** argv,
   return "";
 }
 
-int parse_arguments_and_run(CLI::App& app, int argc, char** argv, const std::function<void()>& run,
-                            const std::function<void(const std::string&)>& report_bad_usage) {
+int parse_and_run(CLI::App& app, int argc, char** argv, const std::function<void()>& run,
+                  const std::function<void(const std::string&)>& report_bad_usage) {
   keep_freed_memory();
   bool quiet = false, verbose = false;
   const auto formatter = std::make_shared<HelpFormatter>();
@@ -225,7 +223,7 @@ int parse_arguments_and_run(CLI::App& app, int argc, char** argv, const std::fun
   std::signal(SIGXFSZ,
               SIG_IGN);  // a write beyond the size limit fails; temporary files are removed
   if (argc == 3 && std::string_view(argv[1]) == "--reference") {
-    const std::string text = format_manual_or_completion(app, argv[2]);
+    const std::string text = format_reference(app, argv[2]);
     if (!text.empty()) {  // the parser reports other names
       std::fputs(text.c_str(), stdout);
       return check_stdout_written(kDone);
@@ -234,7 +232,7 @@ int parse_arguments_and_run(CLI::App& app, int argc, char** argv, const std::fun
   try {
     app.parse(argc, argv);
     log_to_stderr(app.get_name(), quiet, verbose);
-    if (quiet && !redirect_stdout_to_null()) return kBadInput;
+    if (quiet && !discard_stdout()) return kBadInput;
     run();
     return check_stdout_written(kDone);
   } catch (const CLI::Success& success) {  // --help, --version

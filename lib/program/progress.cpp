@@ -19,7 +19,7 @@ Progress::~Progress() {
   if (line_open_) fmt::print(stderr, "\n");
 }
 
-void Progress::update_progress_display(std::size_t done, std::size_t total, std::size_t skipped) {
+void Progress::update(std::size_t done, std::size_t total, std::size_t skipped) {
   using namespace std::chrono_literals;
   const auto now = Clock::now();
   const bool due = now - last_ >= (terminal_ ? 100ms : 5000ms) || (terminal_ && done == total);

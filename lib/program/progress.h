@@ -12,7 +12,7 @@ namespace vlp {
 /// occasional plain line. Silent under --quiet.
 class Progress {
  public:
-  /// Creates a display without output; update_progress_display() prints.
+  /// Creates a display without output; update() prints.
   /// @param things  plural name of the counted items, for example "captures"
   explicit Progress(std::string things);
   /// Ends the line.
@@ -22,7 +22,7 @@ class Progress {
 
   /// Updates the display. `skipped` items needed no work: they are included in `done`, but do not
   /// enter the speed.
-  void update_progress_display(std::size_t done, std::size_t total, std::size_t skipped = 0);
+  void update(std::size_t done, std::size_t total, std::size_t skipped = 0);
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -21,12 +21,12 @@ namespace {
 using Options = std::vector<const CLI::Option*>;
 
 /// Returns the options in --help, in its order.
-Options find_options(const CLI::App& app) {
+Options collect_options(const CLI::App& app) {
   return app.get_options([](const CLI::Option* option) {
     return option->nonpositional() && !option->get_group().empty();
   });
 }
-Options find_positionals(const CLI::App& app) {
+Options collect_positionals(const CLI::App& app) {
   return app.get_options([](const CLI::Option* option) { return option->get_positional(); });
 }
 std::vector<const CLI::App*> find_commands(const CLI::App& app) {
@@ -70,7 +70,7 @@ Value classify_option_value(const CLI::Option& option) {
 }
 
 /// Returns `text` with a backslash before each of `letters`.
-std::string escape_letters_in_text(const std::string& text, std::string_view letters) {
+std::string escape_letters(const std::string& text, std::string_view letters) {
   std::string result;
   for (const char letter : text) {
     if (letters.find(letter) != std::string_view::npos) result += '\\';
@@ -153,7 +153,7 @@ std::string make_function_name(const std::string& program) {
 std::string format_bash_options(const CLI::App& app, const std::string& indent) {
   std::vector<std::string> names;
   std::string cases;
-  for (const CLI::Option* option : find_options(app)) {
+  for (const CLI::Option* option : collect_options(app)) {
     const auto option_names = collect_names(*option);
     names.insert(names.end(), option_names.begin(), option_names.end());
     const Value value = classify_option_value(*option);
@@ -173,7 +173,7 @@ std::string format_bash_options(const CLI::App& app, const std::string& indent) 
 std::string format_zsh_option(const CLI::Option& option) {
   const auto names = collect_names(option);
   const bool is_repeatable = option.get_expected_max() > 1;
-  std::string text = escape_letters_in_text(option.get_description(), "[]:\\");
+  std::string text = escape_letters(option.get_description(), "[]:\\");
   for (auto at = text.find('\''); at != std::string::npos; at = text.find('\'', at + 4)) {
     text.replace(at, 1, "'\\''");
   }
@@ -197,10 +197,10 @@ std::string format_zsh_option(const CLI::Option& option) {
 
 std::string format_zsh_arguments(const CLI::App& app, const std::string& indent) {
   std::string text = indent + "_arguments -s" + (find_commands(app).empty() ? "" : " -C");
-  for (const CLI::Option* option : find_options(app)) {
+  for (const CLI::Option* option : collect_options(app)) {
     text.append(" \\\n").append(indent).append("  ").append(format_zsh_option(*option));
   }
-  if (!find_positionals(app).empty()) text.append(" \\\n" + indent + "  '*:file:_files'");
+  if (!collect_positionals(app).empty()) text.append(" \\\n" + indent + "  '*:file:_files'");
   return text;
 }
 
@@ -219,20 +219,20 @@ std::string format_manual_page(const CLI::App& app) {
       ".TH " + escape_roff(app.get_name()) + " 1 \"\" \"vlp " VLP_VERSION "\" \"VLP\"\n";
   page.append(".SH NAME\n").append(format_name_line(app));
   page.append(".SH SYNOPSIS\n.B ").append(escape_roff(app.get_name())).append("\n[OPTIONS]");
-  for (const CLI::Option* option : find_positionals(app)) {
+  for (const CLI::Option* option : collect_positionals(app)) {
     page.append(" ").append(escape_roff(formatter.make_option_usage(option)));
   }
   page.append(find_commands(app).empty() ? "\n" : " COMMAND ...\n");
   page.append(".SH DESCRIPTION\n").append(format_roff_paragraphs(app.get_description(), false));
-  if (!find_positionals(app).empty()) {
-    page.append(".SH ARGUMENTS\n").append(format_roff_options(find_positionals(app), true));
+  if (!collect_positionals(app).empty()) {
+    page.append(".SH ARGUMENTS\n").append(format_roff_options(collect_positionals(app), true));
   }
-  page.append(".SH OPTIONS\n").append(format_roff_options(find_options(app), false));
+  page.append(".SH OPTIONS\n").append(format_roff_options(collect_options(app), false));
   for (const CLI::App* command : find_commands(app)) {
     page.append(".SH COMMAND ").append(escape_roff(command->get_name())).append("\n");
     page.append(format_roff_paragraphs(command->get_description(), false));
-    page.append(format_roff_options(find_positionals(*command), true));
-    page.append(format_roff_options(find_options(*command), false));
+    page.append(format_roff_options(collect_positionals(*command), true));
+    page.append(format_roff_options(collect_options(*command), false));
   }
   if (!app.get_footer().empty()) {
     page.append(".SH FURTHER\n").append(format_roff_paragraphs(app.get_footer(), true));
@@ -267,7 +267,7 @@ std::string format_bash_completion(const CLI::App& app) {
   } else {
     text.append(format_bash_options(app, "  "));
   }
-  if (commands.empty() && !find_positionals(app).empty())
+  if (commands.empty() && !collect_positionals(app).empty())
     text.append("  [ \"$value\" ] || files=yes\n");
   text.append(
       "  if [[ $current == -* && ! $value ]]; then\n"
@@ -298,7 +298,7 @@ std::string format_zsh_completion(const CLI::App& app) {
   return text + "esac\n";
 }
 
-std::string format_manual_or_completion(const CLI::App& app, std::string_view which) {
+std::string format_reference(const CLI::App& app, std::string_view which) {
   if (which == "man") return format_manual_page(app);
   if (which == "bash") return format_bash_completion(app);
   if (which == "zsh") return format_zsh_completion(app);

@@ -23,6 +23,6 @@ std::string format_zsh_completion(const CLI::App& app);
 
 /// Returns format_manual_page() for "man", format_bash_completion() for "bash",
 /// format_zsh_completion() for "zsh", and an empty string for other names.
-std::string format_manual_or_completion(const CLI::App& app, std::string_view which);
+std::string format_reference(const CLI::App& app, std::string_view which);
 
 }  // namespace vlp

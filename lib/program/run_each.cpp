@@ -82,7 +82,7 @@ std::string read_end_of_file(std::FILE* output) {
   return text;
 }
 
-double convert_timeval_to_seconds(const timeval& time) {
+double to_seconds(const timeval& time) {
   constexpr double microsecond = 1e-6;
   return static_cast<double>(time.tv_sec) + microsecond * static_cast<double>(time.tv_usec);
 }
@@ -103,20 +103,18 @@ std::string run_request(const char* name, const Request& request,
   }
   const nlohmann::json answer{
       {"exit_code", WIFSIGNALED(status) ? -WTERMSIG(status) : WEXITSTATUS(status)},
-      {"cpu_s",
-       convert_timeval_to_seconds(used.ru_utime) + convert_timeval_to_seconds(used.ru_stime)},
+      {"cpu_s", to_seconds(used.ru_utime) + to_seconds(used.ru_stime)},
       {"output", read_end_of_file(output.get())}};
   return answer.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 }  // namespace
 
-void run_program_for_each_stdin_line(const char* name,
-                                     const std::function<int(int argc, char** argv)>& program) {
+void run_each_line(const char* name, const std::function<int(int argc, char** argv)>& program) {
   std::string line;
   while (std::getline(std::cin, line)) {
     fmt::print("{}\n", run_request(name, parse_request(line), program));
-    if (std::fflush(stdout) != 0) break;  // which parse_arguments_and_run() reports
+    if (std::fflush(stdout) != 0) break;  // which parse_and_run() reports
   }
 }
 

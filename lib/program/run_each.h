@@ -22,7 +22,6 @@ namespace vlp {
 /// @param program  function called in place of main()
 /// @throws std::invalid_argument if a line is not such a request
 /// @throws std::runtime_error if no process can be created
-void run_program_for_each_stdin_line(const char* name,
-                                     const std::function<int(int argc, char** argv)>& program);
+void run_each_line(const char* name, const std::function<int(int argc, char** argv)>& program);
 
 }  // namespace vlp

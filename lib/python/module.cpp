@@ -96,7 +96,7 @@ const BodyCovariance kUnknown = BodyCovariance::Constant(kNone);
 
 LampMapFile make_lamp_map_file(const std::filesystem::path& file,
                                const std::optional<std::string>& room) {
-  return read_lamps_and_room_names(file, room.value_or(""));
+  return read_lamps_and_rooms(file, room.value_or(""));
 }
 
 Rows3 get_lamp_positions(const LampMapFile& lamps) {
@@ -236,7 +236,7 @@ Fix locate(const Positioner& positioner, const py::object& lamps, const Doubles&
 }
 
 /// Returns the index at which each run of equal numbers begins, and the number of elements.
-std::vector<std::size_t> find_frame_begins(const Integers& frames) {
+std::vector<std::size_t> list_frame_begins(const Integers& frames) {
   const auto n = static_cast<std::size_t>(frames.shape(0));
   std::vector<std::size_t> begins;
   for (std::size_t i = 0; i < n; ++i) {
@@ -246,13 +246,13 @@ std::vector<std::size_t> find_frame_begins(const Integers& frames) {
   return begins;
 }
 
-py::dict locate_camera_in_frames(const Positioner& positioner, const py::object& frame_of_each,
-                                 const py::object& lamps, const Doubles& pixels,
-                                 const std::optional<Doubles>& sigma_px, const Sensors& sensors) {
+py::dict locate_frames(const Positioner& positioner, const py::object& frame_of_each,
+                       const py::object& lamps, const Doubles& pixels,
+                       const std::optional<Doubles>& sigma_px, const Sensors& sensors) {
   const auto detections = make_detections(to_integers(lamps, "lamps"), pixels, sigma_px);
   const Integers frames = to_integers(frame_of_each, "frames");
   check_length(frames, detections.size(), "frames");
-  const auto begins = find_frame_begins(frames);
+  const auto begins = list_frame_begins(frames);
   const auto n = static_cast<py::ssize_t>(begins.size()) - 1;
   Eigen::VectorXi frame(n), status(n), used(n);
   Rows3 position(n, 3);
@@ -323,7 +323,7 @@ py::dict compute_residuals(const Positioner& positioner, const py::object& lamps
                   "jacobian"_a = jacobian);
 }
 
-std::vector<int> list_rejected_lamp_ids(const Fix& fix) {
+std::vector<int> list_rejected_ids(const Fix& fix) {
   const auto count =
       std::min(static_cast<std::size_t>(fix.rejected_lamps), fix.rejected_ids.size());
   return {fix.rejected_ids.begin(), fix.rejected_ids.begin() + static_cast<std::ptrdiff_t>(count)};
@@ -408,8 +408,7 @@ py::tuple locate_image(const Positioner& positioner, const ImageDetector& of_cam
   {
     const py::gil_scoped_release others_may_run;
     const auto detect_in_plane = [&](const std::optional<Eigen::Matrix3d>& level_from_camera) {
-      return select_lamps(
-          detector.copy_detector_for_camera_tilt(level_from_camera).detect_lights(image));
+      return select_lamps(detector.copy_for_tilt(level_from_camera).detect_lights(image));
     };
     found = locate_with_repeated_detection(
         positioner, sensors,
@@ -429,8 +428,7 @@ ImageDetector make_detector(const LampMapFile& lamps, const Calibration& calibra
   std::optional<LampClassifier> trained;
   if (classifier) {
     trained = read_lamp_classifier(*classifier);
-  } else if (const auto error =
-                 explain_why_room_must_be_chosen(lamps, "the argument room of LampMap");
+  } else if (const auto error = explain_room_choice(lamps, "the argument room of LampMap");
              !error.empty()) {
     throw InputError(lamps.file, error);
   }
@@ -591,7 +589,7 @@ void define_fix(py::module_& m) {
       .def_readonly("lamps", &Fix::lamps, "Used for the fix.")
       .def_readonly("rejected_lamps", &Fix::rejected_lamps)
       .def_property_readonly(
-          "rejected_ids", &list_rejected_lamp_ids,
+          "rejected_ids", &list_rejected_ids,
           "Lamps that were left out because the others contradict them, the first 32.")
       .def_readonly("unknown_lamps", &Fix::unknown_lamps)
       .def_readonly("time_s", &Fix::time_s)
@@ -626,7 +624,7 @@ void define_positioner(py::module_& m) {
            "earlier: frames from shortly before, (lamps, pixels, sigma_px, before_s) each, which\n"
            "determine velocity, yaw rate, roll and pitch together with this one.")
       .def(
-          "locate_frames", &locate_camera_in_frames, "frames"_a, "lamps"_a, "pixels"_a,
+          "locate_frames", &locate_frames, "frames"_a, "lamps"_a, "pixels"_a,
           "sigma_px"_a = py::none(), "sensors"_a = Sensors(),
           "Fixes of many frames: the detections of one follow each other and have the same number\n"
           "in `frames`. A dict of arrays, a row for each frame: frame, status (an index of\n"

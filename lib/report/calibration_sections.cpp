@@ -12,10 +12,10 @@
 namespace vlp {
 namespace {
 
-std::string format_six_digits(double value) { return format_significant_digits(value, 6); }
+std::string format_six_digits(double value) { return format_digits(value, 6); }
 
 /// Formats a standard deviation.
-std::string format_sd(double value) { return format_significant_digits(value, 2); }
+std::string format_sd(double value) { return format_digits(value, 2); }
 
 std::string format_pair(const Eigen::Vector2d& values, const std::string& unit) {
   return format_six_digits(values.x()) + ", " + format_six_digits(values.y()) + " " + unit;
@@ -31,7 +31,7 @@ std::string format_sds(const std::optional<Matrix2>& covariance, double scale,
 
 }  // namespace
 
-std::string make_camera_html_table(const Camera& camera) {
+std::string make_camera_table(const Camera& camera) {
   HtmlTable table;
   const auto add_row = [&](const char* label, std::string value) {
     table.rows.push_back({label, std::move(value)});
@@ -55,42 +55,41 @@ std::string make_camera_html_table(const Camera& camera) {
   return make_html_table(table);
 }
 
-std::string make_intrinsics_html_table(const IntrinsicsReport& report) {
+std::string make_intrinsics_table(const IntrinsicsReport& report) {
   HtmlTable table{"Lens calibration", {}, {}};
   if (report.views > 0) {
     table.rows = {{"views of the board", std::to_string(report.views)},
                   {"corners", std::to_string(report.corners)},
                   {"outliers", std::to_string(report.outliers)},
-                  {"residual, rms per axis", format_significant_digits(report.rms_px, 3) + " px"}};
+                  {"residual, rms per axis", format_digits(report.rms_px, 3) + " px"}};
   }
   if (report.expected_max_error_px) {
     table.rows.push_back({"largest error of the projection that is to be expected",
-                          format_significant_digits(*report.expected_max_error_px, 3) + " px"});
+                          format_digits(*report.expected_max_error_px, 3) + " px"});
   }
   if (!report.region_px.empty()) {
     table.rows.push_back({"known", "in the valid region (valid_region_px) only"});
   }
   if (report.board_warp_m) {
     const auto& [x_m, y_m] = *report.board_warp_m;
-    table.rows.push_back({"deflection of the board along x, y",
-                          format_significant_digits(1e3 * x_m, 3) + ", " +
-                              format_significant_digits(1e3 * y_m, 3) + " mm"});
+    table.rows.push_back(
+        {"deflection of the board along x, y",
+         format_digits(1e3 * x_m, 3) + ", " + format_digits(1e3 * y_m, 3) + " mm"});
   }
   return make_html_table(table);
 }
 
-std::string make_rotation_html_table(const Calibration& calibration) {
+std::string make_rotation_table(const Calibration& calibration) {
   const RotationCenter& center = *calibration.rotation_center;
   const Eigen::Vector3d& up = center.zenith_in_camera;
   const double tilt_rad = std::atan2(up.head<2>().norm(), up.z());
-  HtmlTable table{
-      "",
-      {},
-      {{"rotation center in the undistorted image",
-        format_pair(center.center_px, "px") +
-            format_sds(compute_rotation_center_covariance(calibration), 1, "px")},
-       {"tilt of the camera", format_significant_digits(deg_from_rad(tilt_rad), 4) + " degrees"},
-       {"correction", center.model == RotationModel::tilt ? "tilt" : "shift"}}};
+  HtmlTable table{"",
+                  {},
+                  {{"rotation center in the undistorted image",
+                    format_pair(center.center_px, "px") +
+                        format_sds(compute_center_covariance(calibration), 1, "px")},
+                   {"tilt of the camera", format_digits(deg_from_rad(tilt_rad), 4) + " degrees"},
+                   {"correction", center.model == RotationModel::tilt ? "tilt" : "shift"}}};
   if (center.lever_arm_m) {
     table.rows.push_back(
         {"from the axis of rotation to the camera",
@@ -100,9 +99,9 @@ std::string make_rotation_html_table(const Calibration& calibration) {
   return make_html_table(table);
 }
 
-std::string make_dispersion_html_table(const Calibration& calibration) {
+std::string make_dispersion_table(const Calibration& calibration) {
   const Dispersion& dispersion = *calibration.dispersion;
-  const auto mm = [](double value_m) { return format_significant_digits(1e3 * value_m, 3); };
+  const auto mm = [](double value_m) { return format_digits(1e3 * value_m, 3); };
   return make_html_table(
       {"",
        {},
@@ -112,10 +111,10 @@ std::string make_dispersion_html_table(const Calibration& calibration) {
          mm(dispersion.center_m.x()) + ", " + mm(dispersion.center_m.y()) + " mm"},
         {"offset subtracted from the image",
          format_pair(dispersion.offset_px, "px") +
-             format_sds(compute_dispersion_offset_covariance(calibration), 1, "px")}}});
+             format_sds(compute_offset_covariance(calibration), 1, "px")}}});
 }
 
-std::string make_calibration_history_html_list(const std::vector<HistoryEntry>& entries) {
+std::string make_history_list(const std::vector<HistoryEntry>& entries) {
   constexpr std::size_t max_unfolded = 8;
   std::string html;
   for (const auto& entry : entries) {

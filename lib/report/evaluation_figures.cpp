@@ -19,7 +19,7 @@ std::string format_range(double low, double high) {
 
 ReportStatistic make_length_statistic(const std::string& label, double value_m,
                                       const Interval* interval_m = nullptr) {
-  return {label, format_length_in_mm(value_m), "mm",
+  return {label, format_mm(value_m), "mm",
           interval_m == nullptr ? "" : format_range(1e3 * interval_m->low, 1e3 * interval_m->high)};
 }
 
@@ -41,12 +41,12 @@ void add_horizontal_statistics(std::vector<ReportStatistic>& figures,
 
 std::string describe_comparison(const Comparison& comparison) {
   std::string note = "Compared with the other fixes: ";
-  for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
+  for (std::size_t i = 0; const ComparedQuantity& quantity : list_quantities()) {
     const QuantityComparison& compared = comparison.quantities[i++];
     if (compared.pairs == 0 && i > 1) continue;
     const double factor = quantity.units_per_si;
     const std::string unit = *quantity.unit == 0 ? "" : std::string(" ") + quantity.unit;
-    note.append(quantity.name).append(" ").append(compared.describe_comparison_result(quantity));
+    note.append(quantity.name).append(" ").append(compared.describe_result(quantity));
     if (compared.pairs > 0) {
       note += ", the mean is " + format_number(factor * std::abs(compared.mean_difference)) + unit +
               (compared.mean_difference < 0 ? " smaller" : " larger") + " than theirs";
@@ -65,7 +65,7 @@ std::string describe_comparison(const Comparison& comparison) {
 
 }  // namespace
 
-std::vector<ReportStatistic> format_evaluation_statistics(const Evaluation& evaluation) {
+std::vector<ReportStatistic> list_statistics(const Evaluation& evaluation) {
   std::vector<ReportStatistic> figures = {
       {"captures", std::to_string(evaluation.captures), "", ""},
       {"without a fix", std::to_string(evaluation.captures - evaluation.fixes), "", ""}};
@@ -97,7 +97,7 @@ std::vector<ReportStatistic> format_evaluation_statistics(const Evaluation& eval
                        format_number(evaluation.crlb_ratio->horizontal), "", ""});
   }
   if (evaluation.line_fit) {
-    const auto fit_statistics = format_line_drive_statistics("drive", *evaluation.line_fit);
+    const auto fit_statistics = list_drive_statistics("drive", *evaluation.line_fit);
     figures.insert(figures.end(), fit_statistics.begin(), fit_statistics.end());
   }
   return figures;
@@ -119,17 +119,16 @@ std::vector<std::string> make_evaluation_notes(const Evaluation& evaluation) {
                     " " + evaluation.resampling_unit + ".");
   }
   if (evaluation.comparison) notes.push_back(describe_comparison(*evaluation.comparison));
-  if (const std::string warning = make_errors_below_crlb_warning(evaluation); !warning.empty()) {
+  if (const std::string warning = warn_about_crlb(evaluation); !warning.empty()) {
     notes.push_back("Caution: " + warning + ".");
   }
-  for (const std::string& warning : make_sample_size_warnings(evaluation)) {
+  for (const std::string& warning : warn_about_sample_size(evaluation)) {
     notes.push_back("Caution: " + warning + ".");
   }
   return notes;
 }
 
-std::vector<ReportStatistic> format_line_drive_statistics(const std::string& drive,
-                                                          const LineFit& fit) {
+std::vector<ReportStatistic> list_drive_statistics(const std::string& drive, const LineFit& fit) {
   return {make_length_statistic(drive + ": fitted line from the commanded one, mean",
                                 fit.distances_m.mean),
           make_length_statistic(drive + ": the same, 90th percentile", fit.distances_m.p90),

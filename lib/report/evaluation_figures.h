@@ -12,7 +12,7 @@ namespace vlp {
 
 /// Returns the statistics of an evaluation, formatted for the report.
 /// @pre there is at least one fix
-std::vector<ReportStatistic> format_evaluation_statistics(const Evaluation& evaluation);
+std::vector<ReportStatistic> list_statistics(const Evaluation& evaluation);
 
 /// Returns sentences that explain the statistics of a report, one per element. Subjects: reference
 /// of the errors, captures without a fix, resampling unit of the intervals, comparison, and
@@ -21,7 +21,6 @@ std::vector<std::string> make_evaluation_notes(const Evaluation& evaluation);
 
 /// Returns the statistics of a drive: distances of the fitted line, and jitter. Each label begins
 /// with the name of the drive.
-std::vector<ReportStatistic> format_line_drive_statistics(const std::string& drive,
-                                                          const LineFit& fit);
+std::vector<ReportStatistic> list_drive_statistics(const std::string& drive, const LineFit& fit);
 
 }  // namespace vlp

@@ -35,37 +35,32 @@ ErrorPlot make_floor_plan(const EvaluationInput& input, const std::vector<FixErr
 
 }  // namespace
 
-Drawing draw_fix_errors_on_floor_plan(const EvaluationInput& input, const LampMap& lamps) {
-  return make_fix_error_plot_drawing(
+Drawing draw_floor_plan(const EvaluationInput& input, const LampMap& lamps) {
+  return draw_fix_errors(
       make_floor_plan(input, compute_fix_errors(input, input.fixes).errors, lamps));
 }
 
-std::vector<ReportPlot> make_position_error_plots(const EvaluationInput& input,
-                                                  const Evaluation& evaluation,
-                                                  const LampMap& lamps) {
+std::vector<ReportPlot> make_error_plots(const EvaluationInput& input, const Evaluation& evaluation,
+                                         const LampMap& lamps) {
   const std::vector<FixError> errors = compute_fix_errors(input, input.fixes).errors;
   std::vector<ReportPlot> pictures;
   if (!input.line_m) {
-    pictures.push_back(
-        make_report_plot(make_fix_error_plot_drawing(make_floor_plan(input, errors, lamps))));
+    pictures.push_back(make_report_plot(draw_fix_errors(make_floor_plan(input, errors, lamps))));
   } else if (evaluation.line_fit) {
     pictures.push_back(
-        make_line_drive_plot("Drive", input.fixes.rows, *input.line_m, *evaluation.line_fit));
+        make_drive_plot("Drive", input.fixes.rows, *input.line_m, *evaluation.line_fit));
   }
   CdfPlot::Curve curve{"fixes", {}, evaluation.horizontal_m.median, evaluation.horizontal_m.p90};
   curve.errors_m.reserve(errors.size());
   for (const FixError& error : errors) curve.errors_m.push_back(error.horizontal_m.norm());
-  pictures.push_back(
-      make_report_plot(make_error_cdf_plot_drawing(CdfPlot{"Horizontal errors", {curve}})));
-  pictures.back().alt += " The median error is " + format_length_with_mm_unit(curve.p50_m) +
-                         ", nine tenths no further than " +
-                         format_length_with_mm_unit(curve.p90_m) + ".";
+  pictures.push_back(make_report_plot(draw_error_cdf(CdfPlot{"Horizontal errors", {curve}})));
+  pictures.back().alt += " The median error is " + format_with_mm(curve.p50_m) +
+                         ", nine tenths no further than " + format_with_mm(curve.p90_m) + ".";
   return pictures;
 }
 
-std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& fixes,
-                                                     const LampMap& lamps,
-                                                     const Calibration& calibration) {
+std::optional<ReportPlot> make_budget_plot(const std::vector<FixRow>& fixes, const LampMap& lamps,
+                                           const Calibration& calibration) {
   if (lamps.lamps.empty()) return std::nullopt;
   const UnitErrors unit(lamps, calibration);
   BudgetPlot plot{
@@ -73,13 +68,13 @@ std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& 
   const auto horizontal = [](const Eigen::Vector4d& sd) { return sd.head<2>().squaredNorm(); };
   for (const FixRow& row : fixes) {
     if (!row.fix || !row.fix->sd || !row.fix->noise_sd || row.fix->inclination) continue;
-    auto visible = unit.find_fully_visible_lamp_indices(row.fix->pose);
+    auto visible = unit.list_visible_lamps(row.fix->pose);
     std::erase_if(visible, [&](std::size_t lamp) {
       const auto& rejected = row.rejected_lamps;
       return std::find(rejected.begin(), rejected.end(), lamps.lamps[lamp].id) != rejected.end();
     });
     constexpr double arbitrary_px = 1;  // arbitrary: the proportions do not depend on it
-    const auto budget = unit.compute_unit_fix_error_budget(row.fix->pose, visible, arbitrary_px);
+    const auto budget = unit.compute_budget(row.fix->pose, visible, arbitrary_px);
     if (!budget) continue;
     const double common_m = compute_fix_sds(budget->common_covariance()).horizontal_m;
     if (!(common_m > 0)) continue;
@@ -94,8 +89,8 @@ std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& 
                                  part_variance_m2(budget->lamp_map)});
   }
   if (plot.variances_m2.empty()) return std::nullopt;
-  ReportPlot picture = make_report_plot(make_variance_budget_plot_drawing(plot));
-  const std::vector<double> fractions = plot.compute_variance_contribution_fractions();
+  ReportPlot picture = make_report_plot(draw_budget(plot));
+  const std::vector<double> fractions = plot.compute_fractions();
   for (std::size_t i = 0; i < fractions.size(); ++i) {
     picture.alt +=
         fmt::format("{} {} {:.0f} %", i == 0 ? "" : ",", plot.parts[i], 100 * fractions[i]);
@@ -104,16 +99,16 @@ std::optional<ReportPlot> make_fix_error_budget_plot(const std::vector<FixRow>& 
   return picture;
 }
 
-ReportPlot make_line_drive_plot(const std::string& title, const std::vector<FixRow>& fixes,
-                                const CommandedLine& commanded_m, const LineFit& fit) {
+ReportPlot make_drive_plot(const std::string& title, const std::vector<FixRow>& fixes,
+                           const CommandedLine& commanded_m, const LineFit& fit) {
   TrackPlot plot{title, commanded_m, {}, fit.line_m};
   for (const FixRow& row : fixes) {
     if (row.fix) plot.fixes_m.push_back(get_fix_position_m(row));
   }
-  ReportPlot picture = make_report_plot(make_line_drive_plot_drawing(plot));
+  ReportPlot picture = make_report_plot(draw_line_drive(plot));
   picture.caption = title + ". " + picture.caption;
   picture.alt = title + ". " + picture.alt + " The fitted line is off by " +
-                format_length_with_mm_unit(fit.distances_m.mean) + " on average.";
+                format_with_mm(fit.distances_m.mean) + " on average.";
   return picture;
 }
 

@@ -20,20 +20,19 @@ std::string append_unit(const std::string& text, const std::string& unit) {
 }
 
 std::string format_quantity(const std::optional<double>& value, const std::string& unit) {
-  return value ? append_unit(format_significant_digits(*value, 4), unit) : "none";
+  return value ? append_unit(format_digits(*value, 4), unit) : "none";
 }
 
-std::vector<std::string> make_gate_table_row(const CheckedMetric& gate, bool may_be_out_of_reach) {
+std::vector<std::string> make_gate_row(const CheckedMetric& gate, bool may_be_out_of_reach) {
   const bool out_of_reach = may_be_out_of_reach && !gate.value;
   const std::string result = gate.has_passed_gate() ? "met"
                              : out_of_reach         ? "not\u00a0reached"
                                                     : "NOT\u00a0MET";
   const auto sure = gate.conformance_probability();
   return {gate.name, format_quantity(gate.value, gate.unit),
-          describe_limit_direction(gate.direction) + kSpace +
-              format_quantity(gate.limit, gate.unit) + describe_guard_band(gate),
-          result +
-              (sure ? ", conforms with p\u00a0=\u00a0" + format_significant_digits(*sure, 3) : "")};
+          describe_direction(gate.direction) + kSpace + format_quantity(gate.limit, gate.unit) +
+              describe_guard_band(gate),
+          result + (sure ? ", conforms with p\u00a0=\u00a0" + format_digits(*sure, 3) : "")};
 }
 
 std::string make_gates_table(const Report& report) {
@@ -42,7 +41,7 @@ std::string make_gates_table(const Report& report) {
     const bool given = report.verdict.has_value();
     if (!gate.has_passed_gate() && (gate.value || !given))
       table.highlighted_rows.push_back(table.rows.size());
-    table.rows.push_back(make_gate_table_row(gate, given));
+    table.rows.push_back(make_gate_row(gate, given));
   }
   return table.rows.empty() ? "" : make_html_table(table);
 }
@@ -125,7 +124,7 @@ std::string format_history(const Report& report) {
   std::vector<HistoryEntry> entries;
   if (report.calibration) entries = report.calibration->history;
   if (report.evaluation) entries.push_back(*report.evaluation);
-  return make_calibration_history_html_list(entries);
+  return make_history_list(entries);
 }
 
 }  // namespace
@@ -133,11 +132,11 @@ std::string format_history(const Report& report) {
 std::string render_report_html(const Report& report) {
   std::string camera, rotation, dispersion;
   if (const auto& calibration = report.calibration) {
-    camera = make_camera_html_table(calibration->camera);
+    camera = make_camera_table(calibration->camera);
     if (calibration->intrinsics_report)
-      camera += make_intrinsics_html_table(*calibration->intrinsics_report);
-    if (calibration->rotation_center) rotation = make_rotation_html_table(*calibration);
-    if (calibration->dispersion) dispersion = make_dispersion_html_table(*calibration);
+      camera += make_intrinsics_table(*calibration->intrinsics_report);
+    if (calibration->rotation_center) rotation = make_rotation_table(*calibration);
+    if (calibration->dispersion) dispersion = make_dispersion_table(*calibration);
   }
   const auto pictures = [&](ReportPart part) { return format_plots(report, part); };
   return make_html_page(

@@ -65,7 +65,7 @@ constexpr std::array<Kind, 8> kKinds = {
       "Map of the theoretical limit over the floor with the lamps."}}};
 
 /// Returns the text between <title> and </title>; empty if there is none.
-std::string_view find_svg_title(std::string_view svg) {
+std::string_view extract_svg_title(std::string_view svg) {
   constexpr std::string_view opening = "<title>";
   const std::size_t start = svg.find(opening);
   if (start == std::string_view::npos) return {};
@@ -105,7 +105,7 @@ ReportPlot read_report_plot(const std::filesystem::path& file) {
     // [FILE-4]
     throw InputError(file, "is cut short, or holds no picture");
   }
-  ReportPlot plot = classify_plot(find_svg_title(image), file.filename().string());
+  ReportPlot plot = classify_plot(extract_svg_title(image), file.filename().string());
   plot.image = std::move(image);
   return plot;
 }
@@ -117,7 +117,7 @@ ReportPlot make_report_plot(Drawing drawing) {
   return plot;
 }
 
-void render_report_plots(std::vector<ReportPlot>& plots) {
+void render_plots(std::vector<ReportPlot>& plots) {
   std::vector<Drawing> drawings;
   for (ReportPlot& plot : plots) {
     if (plot.drawing) drawings.push_back(*plot.drawing);
@@ -133,7 +133,7 @@ void render_report_plots(std::vector<ReportPlot>& plots) {
 
 ReportPlot render_report_plot(Drawing drawing) {
   std::vector<ReportPlot> plots{make_report_plot(std::move(drawing))};
-  render_report_plots(plots);
+  render_plots(plots);
   return std::move(plots.front());
 }
 

@@ -17,7 +17,7 @@ enum class ReportPart { camera, rotation, dispersion, floor, distribution, track
 /// Plot or image of the report with its caption, alternative text and table.
 struct ReportPlot {
   ReportPart part;
-  /// Complete content of an SVG or PNG file; empty until render_report_plots() if there is a
+  /// Complete content of an SVG or PNG file; empty until render_plots() if there is a
   /// drawing.
   std::string image;
   /// Caption: content of the plot and how to read it. Alt: description for readers who cannot see
@@ -34,12 +34,12 @@ struct ReportPlot {
 /// @throws InputError if the file cannot be read, is longer than 16 MiB, or is neither SVG nor PNG
 ReportPlot read_report_plot(const std::filesystem::path& file);
 
-/// Returns a drawing as a plot of the report, to be rendered by render_report_plots().
+/// Returns a drawing as a plot of the report, to be rendered by render_plots().
 ReportPlot make_report_plot(Drawing drawing);
 
 /// Renders each drawing into `image` and removes the drawing. Other plots are unchanged.
 /// @throws InputError as render_plots_as_svg()
-void render_report_plots(std::vector<ReportPlot>& plots);
+void render_plots(std::vector<ReportPlot>& plots);
 /// Renders a drawing as a plot of the report.
 /// @throws InputError as render_plots_as_svg()
 ReportPlot render_report_plot(Drawing drawing);

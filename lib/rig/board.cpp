@@ -41,7 +41,7 @@ Board make_board_of_squares(BoardKind kind) {
 }
 
 /// Reads Kalibr's checkerboard, which counts corners.
-Board read_kalibr_checkerboard(YamlMap& io) {
+Board read_checkerboard(YamlMap& io) {
   Board board = make_board_of_squares(BoardKind::chessboard);
   constexpr Range corners_per_side{kMinSquaresPerSide - 1, kMaxTagsPerSide - 1};
   io.required("targetCols", board.cols, corners_per_side);
@@ -83,7 +83,7 @@ void read_grid_target(YamlMap& io, Board& board) {
   std::string type = "aprilgrid";
   const YamlField target_type = io.optional("target_type", type);
   if (type == "checkerboard") {
-    board = read_kalibr_checkerboard(io);
+    board = read_checkerboard(io);
     return;
   }
   target_type.check(type == "aprilgrid",
@@ -157,7 +157,7 @@ static void describe_squares(Io& io, Described<Io, Board> board) {
 template <typename Io>
 void describe(Io& io, Described<Io, Board> board) {
   io.optional("kind", board.kind, Words{kKinds, "the kinds of boards are: "});
-  if (!board.has_chessboard_squares()) return describe_tags(io, board);
+  if (!board.has_squares()) return describe_tags(io, board);
   if constexpr (Io::is_reader) board = make_board_of_squares(board.kind);
   describe_squares(io, board);
 }
@@ -187,7 +187,7 @@ Board read_board(const std::filesystem::path& file) {
 }
 
 void write_board(const std::filesystem::path& file, const Board& board) {
-  write_file(file, format_yaml_document(kBoardFormat, BoardFile{board}));
+  write_file(file, format_document(kBoardFormat, BoardFile{board}));
 }
 
 }  // namespace vlp

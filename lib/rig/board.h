@@ -60,7 +60,7 @@ struct Board {
   /// unknown.
   double print_sd = 0;
 
-  bool has_chessboard_squares() const { return kind != BoardKind::apriltags; }
+  bool has_squares() const { return kind != BoardKind::apriltags; }
 };
 
 /// Reads a board from `vlp-board/1` or from a target file of Kalibr, basalt or yac.

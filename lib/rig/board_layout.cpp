@@ -34,8 +34,7 @@ std::vector<BoardTag> make_markers(const Board& board) {
 }  // namespace
 
 double compute_tag_pitch_m(const Board& board) {
-  return board.has_chessboard_squares() ? board.square_size_m
-                                        : board.tag_size_m * (1 + board.tag_spacing);
+  return board.has_squares() ? board.square_size_m : board.tag_size_m * (1 + board.tag_spacing);
 }
 
 bool is_square_black(const Board& board, int col, int row) {
@@ -43,14 +42,14 @@ bool is_square_black(const Board& board, int col, int row) {
 }
 
 Eigen::Vector2d compute_tag_field_size_m(const Board& board) {
-  if (board.has_chessboard_squares()) {
+  if (board.has_squares()) {
     return Eigen::Vector2d(board.cols - 2, board.rows - 2) * board.square_size_m;
   }
   return Eigen::Vector2d(board.cols - 1, board.rows - 1) * compute_tag_pitch_m(board) +
          Eigen::Vector2d::Constant(board.tag_size_m);
 }
 
-std::vector<Eigen::Vector2d> list_chessboard_corners_m(const Board& board) {
+std::vector<Eigen::Vector2d> list_inner_corners_m(const Board& board) {
   std::vector<Eigen::Vector2d> corners_m;
   for (int row = 0; row < board.rows - 1; ++row) {
     for (int col = 0; col < board.cols - 1; ++col) {

@@ -31,7 +31,7 @@ Eigen::Vector2d compute_tag_field_size_m(const Board& board);
 bool is_square_black(const Board& board, int col, int row);
 
 /// Returns the inner corners of a board of squares, row by row from the top left.
-std::vector<Eigen::Vector2d> list_chessboard_corners_m(const Board& board);
+std::vector<Eigen::Vector2d> list_inner_corners_m(const Board& board);
 
 /// Returns the tags or markers of a board, row by row from the top left; none for a chessboard.
 std::vector<BoardTag> list_board_tags(const Board& board);

@@ -104,7 +104,7 @@ void check_parameters(const JointCovariance& joint, const Calibration& calibrati
   };
   pass_pair(kZenithParameter, calibration.rotation_center.has_value());
   pass_pair(kLeverArmParameter, calibration.rotation_center.has_value());
-  for (const auto& lamp : joint.lamps) pass(list_lamp_parameter_names(lamp.id));
+  for (const auto& lamp : joint.lamps) pass(list_lamp_parameters(lamp.id));
   pass_pair(kOffsetParameter, calibration.dispersion.has_value());
   if (next == joint.parameters.size()) return;
   // [FILE-4] `is not in its place`
@@ -131,7 +131,7 @@ inline constexpr bool kSpansLines<HistoryEntry> = true;
 
 static void read_value(const YamlValue& value, LensModel& target) {
   const auto model = lens_model_from_name(value.read_text());
-  if (!model) throw value.make_unknown_word_error("the models are: " + list_lens_model_names());
+  if (!model) throw value.make_word_error("the models are: " + list_lens_model_names());
   target = *model;
 }
 
@@ -189,8 +189,7 @@ static void describe(Io& io, Described<Io, IntrinsicsReport> report, const Camer
   // Infinite if the lens has no ray, which YAML cannot represent; a gate reports it.
   if (Io::is_reader || std::isfinite(report.expected_max_error_px.value_or(0)))
     io.optional("expected_max_error_px", report.expected_max_error_px, kResidual);
-  io.optional("covariance", report.covariance,
-              LowerTriangle{0, count_intrinsics_with_covariance(camera)});
+  io.optional("covariance", report.covariance, LowerTriangle{0, count_intrinsics(camera)});
   io.optional("valid_region_px", report.region_px)
       .check(report.region_px.size() >= 3, "should have three corners or more");
 }
@@ -246,7 +245,7 @@ static void describe(Io& io, Described<Io, JointCovariance> joint, const Calibra
   LowerTriangle part{0, std::ssize(joint.parameters)};
   const auto& report = calibration.intrinsics_report;
   if (joint.find_row("fx")) {
-    part.first_row = count_intrinsics_with_covariance(calibration.camera);
+    part.first_row = count_intrinsics(calibration.camera);
     if (report && report->covariance) part.known = &*report->covariance;
   }
   io.required("rows", joint.matrix, part);
@@ -283,12 +282,12 @@ Calibration read_calibration(const std::filesystem::path& file) {
   return read_yaml_document<Calibration>(file, kCalibrationFormat);
 }
 
-std::string format_calibration_yaml(const Calibration& calibration) {
-  return format_yaml_document(kCalibrationFormat, calibration);
+std::string format_calibration(const Calibration& calibration) {
+  return format_document(kCalibrationFormat, calibration);
 }
 
 void write_calibration(const std::filesystem::path& file, const Calibration& calibration) {
-  write_file(file, format_calibration_yaml(calibration));
+  write_file(file, format_calibration(calibration));
 }
 
 }  // namespace vlp

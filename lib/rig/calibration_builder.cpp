@@ -19,8 +19,8 @@ void add_history(Calibration& calibration, const std::string& part, HistoryEntry
 
 }  // namespace
 
-Calibration make_camera_only_calibration(Camera camera, std::optional<IntrinsicsReport> report,
-                                         HistoryEntry entry) {
+Calibration make_calibration(Camera camera, std::optional<IntrinsicsReport> report,
+                             HistoryEntry entry) {
   Calibration calibration;
   calibration.camera = std::move(camera);
   calibration.intrinsics_report = std::move(report);
@@ -28,11 +28,9 @@ Calibration make_camera_only_calibration(Camera camera, std::optional<Intrinsics
   return calibration;
 }
 
-Calibration add_rotation_center_to_calibration(Calibration calibration,
-                                               const RotationCenter& rotation_center,
-                                               std::optional<JointCovariance> covariance,
-                                               HistoryEntry entry) {
-  calibration = remove_dispersion_from_calibration(std::move(calibration));
+Calibration add_rotation_center(Calibration calibration, const RotationCenter& rotation_center,
+                                std::optional<JointCovariance> covariance, HistoryEntry entry) {
+  calibration = remove_dispersion(std::move(calibration));
   calibration.adjustment.reset();
   remove_history(calibration, "adjustment");
   calibration.rotation_center = rotation_center;
@@ -41,11 +39,9 @@ Calibration add_rotation_center_to_calibration(Calibration calibration,
   return calibration;
 }
 
-Calibration add_adjustment_to_calibration(Calibration calibration,
-                                          const RotationCenter& rotation_center,
-                                          Adjustment adjustment, JointCovariance covariance,
-                                          HistoryEntry entry) {
-  calibration = remove_dispersion_from_calibration(std::move(calibration));
+Calibration add_adjustment(Calibration calibration, const RotationCenter& rotation_center,
+                           Adjustment adjustment, JointCovariance covariance, HistoryEntry entry) {
+  calibration = remove_dispersion(std::move(calibration));
   remove_history(calibration, "rotation_center");
   calibration.rotation_center = rotation_center;
   calibration.adjustment = std::move(adjustment);
@@ -54,13 +50,13 @@ Calibration add_adjustment_to_calibration(Calibration calibration,
   return calibration;
 }
 
-Calibration remove_dispersion_from_calibration(Calibration calibration) {
+Calibration remove_dispersion(Calibration calibration) {
   calibration.dispersion.reset();
   remove_history(calibration, "dispersion");
   if (auto& joint = calibration.covariance; joint && joint->find_row(kOffsetParameter)) {
     const Eigen::Index offset_row = std::ssize(joint->parameters) - 2;
     Eigen::Index rows = offset_row;
-    // add_offset_to_covariance() appends lamps that are independent of all earlier parameters.
+    // append_offset() appends lamps that are independent of all earlier parameters.
     while (!joint->lamps.empty() && joint->matrix.block(rows - 3, 0, 3, rows - 3).isZero(0) &&
            !joint->matrix.block(offset_row, rows - 3, 2, 3).isZero(0)) {
       joint->lamps.pop_back();
@@ -72,9 +68,8 @@ Calibration remove_dispersion_from_calibration(Calibration calibration) {
   return calibration;
 }
 
-Calibration add_dispersion_to_calibration(Calibration calibration, const Dispersion& dispersion,
-                                          std::optional<JointCovariance> covariance,
-                                          HistoryEntry entry) {
+Calibration add_dispersion(Calibration calibration, const Dispersion& dispersion,
+                           std::optional<JointCovariance> covariance, HistoryEntry entry) {
   calibration.dispersion = dispersion;
   calibration.covariance = std::move(covariance);
   add_history(calibration, "dispersion", std::move(entry));

@@ -12,7 +12,7 @@ namespace vlp {
 
 /// Formats a calibration as YAML text, format `vlp-calibration/1`: the content of the file of
 /// write_calibration().
-std::string format_calibration_yaml(const Calibration& calibration);
+std::string format_calibration(const Calibration& calibration);
 
 }  // namespace vlp
 #pragma GCC visibility pop

@@ -127,7 +127,7 @@ bool remove_abandoned_file(const fs::path& path) {
 
 /// Creates a file in the folder of `target` with a name that is unique among processes and threads,
 /// and locks it.
-int create_temporary_file_beside(const fs::path& target, mode_t mode, fs::path& temporary) {
+int create_temporary(const fs::path& target, mode_t mode, fs::path& temporary) {
   constexpr std::size_t max_bytes = 200;  // of the 255 of a file name
   const std::string name = "." + target.filename().string().substr(0, max_bytes) + ".tmp-";
   for (int number = 0;; ++number) {
@@ -149,11 +149,11 @@ int create_replacement(const fs::path& target, fs::path& temporary) {
   constexpr mode_t as_user_set = 0666, private_to_owner = 0600;
   struct stat old {};
   if (::lstat(target.c_str(), &old) != 0 || !S_ISREG(old.st_mode)) {
-    return create_temporary_file_beside(target, as_user_set, temporary);
+    return create_temporary(target, as_user_set, temporary);
   }
-  const int descriptor = create_temporary_file_beside(target, private_to_owner, temporary);
+  const int descriptor = create_temporary(target, private_to_owner, temporary);
   if (descriptor < 0) return descriptor;
-  if (copy_mode_and_owner(descriptor, old)) return descriptor;
+  if (copy_owner(descriptor, old)) return descriptor;
   const int reason = errno;
   ::close(descriptor);
   ::unlink(temporary.c_str());
@@ -316,7 +316,7 @@ void write_file(const fs::path& path, std::string_view content) {
   file.save_file();
 }
 
-bool copy_mode_and_owner(int descriptor, const struct stat& former) {
+bool copy_owner(int descriptor, const struct stat& former) {
   constexpr auto same_owner = static_cast<uid_t>(-1);
   constexpr mode_t permissions = 0777, group_permissions = 0070;
   if (::fchown(descriptor, former.st_uid, former.st_gid) != 0) {

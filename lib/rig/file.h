@@ -90,6 +90,6 @@ class AtomicFileWriter {
 /// Sets the permissions (read, write, execute), owner and group of an open file to those of the
 /// file that it replaces; owner and group as far as this process may set them. If the group
 /// differs, it gets no permissions. Returns false, and sets errno, if they cannot be read or set.
-[[gnu::visibility("hidden")]] bool copy_mode_and_owner(int descriptor, const struct stat& former);
+[[gnu::visibility("hidden")]] bool copy_owner(int descriptor, const struct stat& former);
 
 }  // namespace vlp

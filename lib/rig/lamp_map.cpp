@@ -71,10 +71,10 @@ const Lamp* find_lamp_by_id(std::span<const Lamp> lamps, int id) {
 LampMap read_lamp_map(const std::filesystem::path& file) { return read_lamps_of_room(file, ""); }
 
 LampMap read_lamps_of_room(const std::filesystem::path& file, const std::string& room) {
-  return read_lamps_and_room_names(file, room).map;
+  return read_lamps_and_rooms(file, room).map;
 }
 
-LampMap read_overhead_lamps_of_room(const std::filesystem::path& file, const std::string& room) {
+LampMap read_overhead_lamps(const std::filesystem::path& file, const std::string& room) {
   LampMap map = read_lamps_of_room(file, room);
   if (map.lamps_below_camera) {
     throw InputError(file,
@@ -84,7 +84,7 @@ LampMap read_overhead_lamps_of_room(const std::filesystem::path& file, const std
   return map;
 }
 
-LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const std::string& room) {
+LampMapFile read_lamps_and_rooms(const std::filesystem::path& file, const std::string& room) {
   YamlMap document = read_yaml_file(file, kLampsFormat);
   std::optional<double> sd_m;
   document.optional("sd_m", sd_m, kSurveySd);
@@ -122,7 +122,7 @@ LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const s
 }
 
 void write_lamp_map(const std::filesystem::path& file, const LampMap& map) {
-  write_file(file, format_yaml_document(kLampsFormat, map));
+  write_file(file, format_document(kLampsFormat, map));
 }
 
 }  // namespace vlp

@@ -21,10 +21,10 @@ struct LampMapFile {
 
 /// Reads the lamps of read_lamps_of_room() and the name of the room of each lamp. Throws
 /// InputError.
-LampMapFile read_lamps_and_room_names(const std::filesystem::path& file, const std::string& room);
+LampMapFile read_lamps_and_rooms(const std::filesystem::path& file, const std::string& room);
 
 /// Reads a map as read_lamps_of_room() does, for a purpose that needs lamps above the camera.
 /// @throws InputError also if the map states lamps_below_camera
-LampMap read_overhead_lamps_of_room(const std::filesystem::path& file, const std::string& room);
+LampMap read_overhead_lamps(const std::filesystem::path& file, const std::string& room);
 
 }  // namespace vlp

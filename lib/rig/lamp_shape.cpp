@@ -22,7 +22,7 @@ constexpr std::array kShapeNames{kShapeTraits[0].name, kShapeTraits[1].name};
 static_assert(kShapeNames.size() == kShapeTraits.size());
 constexpr Words kShapeWords{kShapeNames, ""};
 
-std::string list_shapes_with_two_sizes() {
+std::string list_two_sizes() {
   std::string names;
   for (const ShapeTraits& traits : kShapeTraits) {
     if (traits.has_two_sizes) names.append(names.empty() ? "" : ", ").append(traits.name);
@@ -80,7 +80,7 @@ void describe(Io& io, Described<Io, LampShape> shape) {
       shape.size_m = size_m;
       shape.yaw_rad = yaw_rad.value_or(0);
     } else {
-      const std::string names = list_shapes_with_two_sizes();
+      const std::string names = list_two_sizes();
       (size ? size : yaw).check(false, "is of a " + names + ": say 'shape: " + names + "', too");
       if (diameter_m) shape = make_disc_lamp_shape(*diameter_m);
     }

@@ -47,17 +47,17 @@ class TreeBuilder : public YAML::EventHandler {
   void OnMapEnd() override { close(); }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t) override {
-    add({YamlNode::Kind::null, line_number_of_yaml_mark(mark), {}, {}});
+    add({YamlNode::Kind::null, line_of_mark(mark), {}, {}});
   }
   void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t,
                 const std::string& text) override {
-    add({YamlNode::Kind::scalar, line_number_of_yaml_mark(mark), text, {}});
+    add({YamlNode::Kind::scalar, line_of_mark(mark), text, {}});
   }
 
  private:
   void open(YamlNode::Kind kind, const YAML::Mark& mark) {
     constexpr std::size_t max_depth = 20;
-    open_.push_back({kind, line_number_of_yaml_mark(mark), {}, {}});
+    open_.push_back({kind, line_of_mark(mark), {}, {}});
     if (open_.size() > max_depth)
       throw_not_supported(mark, "is nested too deep: is it the right file?");
   }
@@ -74,7 +74,7 @@ class TreeBuilder : public YAML::EventHandler {
     }
   }
   [[noreturn]] void throw_not_supported(const YAML::Mark& mark, const std::string& problem) const {
-    throw InputError(file_, line_number_of_yaml_mark(mark), "", problem);
+    throw InputError(file_, line_of_mark(mark), "", problem);
   }
   const std::filesystem::path& file_;
   bool found_document_ = false;
@@ -83,7 +83,7 @@ class TreeBuilder : public YAML::EventHandler {
 };
 
 YamlNode build_tree(const std::filesystem::path& file, const std::string& text) {
-  const std::size_t valid = count_bytes_of_utf8_prefix(text);
+  const std::size_t valid = count_utf8_prefix(text);
   if (valid < text.size()) {
     const auto line = std::count(text.begin(), text.begin() + std::ptrdiff_t(valid), '\n') + 1;
     throw InputError(file, std::size_t(line), "", "is not UTF-8 text: save it in that encoding");
@@ -98,17 +98,17 @@ YamlNode build_tree(const std::filesystem::path& file, const std::string& text) 
     return tree.take_root_node();
   } catch (const YAML::Exception& failure) {
     const bool tabs = text.find('\t') != std::string::npos;
-    throw InputError(file, line_number_of_yaml_mark(failure.mark), "",
+    throw InputError(file, line_of_mark(failure.mark), "",
                      "is not valid YAML: " + failure.msg +
                          (tabs ? " (there are tabs: YAML is indented with spaces)" : ""));
   }
 }
 
 /// Describes a value for a message: 'text', a list, a mapping, nothing.
-std::string describe_yaml_value(const YamlNode& node) {
+std::string describe_value(const YamlNode& node) {
   switch (node.kind) {
     case YamlNode::Kind::scalar:
-      return quote_text_for_message(node.text);
+      return quote_for_message(node.text);
     case YamlNode::Kind::list:
       return "a list";
     case YamlNode::Kind::map:
@@ -134,7 +134,7 @@ YamlMap::YamlMap(const YamlPart& node, const std::filesystem::path* file, std::s
     const YamlNode &name = node->children[i], &value = node->children[i + 1];
     if (name.kind != YamlNode::Kind::scalar) throw make_error(name.line, "a key should be a word");
     if (!seen.insert(name.text).second) {
-      throw make_error(name.line, "key " + quote_text_for_message(name.text) + " occurs twice");
+      throw make_error(name.line, "key " + quote_for_message(name.text) + " occurs twice");
     }
     entries_.push_back({name.text, name.line, YamlPart(node, &value)});
   }
@@ -170,8 +170,8 @@ void YamlMap::check_all_keys_read() const {
     if (std::find(known_.begin(), known_.end(), entry.key) != known_.end()) continue;
     std::string names;
     for (const std::string& name : known_) names += (names.empty() ? "" : ", ") + name;
-    throw make_error(entry.line, "key " + quote_text_for_message(entry.key) +
-                                     " is unknown; the keys are: " + names);
+    throw make_error(entry.line,
+                     "key " + quote_for_message(entry.key) + " is unknown; the keys are: " + names);
   }
 }
 
@@ -207,7 +207,7 @@ void check_yaml_format(YamlMap& map, const std::string& format) {
   }
   if (found->read_text() != format) {
     throw found->make_error("should be '" + format + "', not " +
-                            quote_text_for_message(found->read_text()) + ": is it the right file?");
+                            quote_for_message(found->read_text()) + ": is it the right file?");
   }
 }
 
@@ -233,7 +233,7 @@ YamlValue::YamlValue(YamlPart node, const std::filesystem::path* file, std::stri
 double YamlValue::read_number() const {
   const auto value = parse_number<double>(*node_);
   if (!value || !std::isfinite(*value)) {
-    throw make_error("should be a finite number, not " + describe_yaml_value(*node_));
+    throw make_error("should be a finite number, not " + describe_value(*node_));
   }
   return *value;
 }
@@ -244,10 +244,9 @@ double YamlValue::read_number(const Range& range) const {
     const std::string unit(range.unit);
     // [FILE-3] `is it in the right unit?` | mm, us or degrees in place of m, s or rad; national
     //   coordinates | convert
-    throw make_error(format_shortest_exact_number(value) + " " + unit + " is not within " +
-                     format_shortest_exact_number(range.min) + " and " +
-                     format_shortest_exact_number(range.max) + " " + unit +
-                     ": is it in the right unit?");
+    throw make_error(format_exact_number(value) + " " + unit + " is not within " +
+                     format_exact_number(range.min) + " and " + format_exact_number(range.max) +
+                     " " + unit + ": is it in the right unit?");
   }
   return value;
 }
@@ -257,7 +256,7 @@ int YamlValue::read_integer(const Range& range) const {
   if (!value || *value < range.min || *value > range.max) {
     throw make_error(
         "should be a whole number within " + std::to_string(static_cast<int>(range.min)) + " and " +
-        std::to_string(static_cast<int>(range.max)) + ", not " + describe_yaml_value(*node_));
+        std::to_string(static_cast<int>(range.max)) + ", not " + describe_value(*node_));
   }
   return *value;
 }
@@ -265,12 +264,12 @@ int YamlValue::read_integer(const Range& range) const {
 bool YamlValue::read_boolean() const {
   if (node_->kind == YamlNode::Kind::scalar && node_->text == "true") return true;
   if (node_->kind == YamlNode::Kind::scalar && node_->text == "false") return false;
-  throw make_error("should be true or false, not " + describe_yaml_value(*node_));
+  throw make_error("should be true or false, not " + describe_value(*node_));
 }
 
 std::string YamlValue::read_text() const {
   if (node_->kind != YamlNode::Kind::scalar)
-    throw make_error("should be text, not " + describe_yaml_value(*node_));
+    throw make_error("should be text, not " + describe_value(*node_));
   return node_->text;
 }
 
@@ -281,7 +280,7 @@ std::size_t YamlValue::read_word(const Words& words) const {
     if (text == words.names[i]) return i;
     known.append(i == 0 ? "" : words.separator).append(words.names[i]);
   }
-  throw make_unknown_word_error(known);
+  throw make_word_error(known);
 }
 
 std::vector<double> YamlValue::read_numbers(std::size_t count) const {
@@ -296,7 +295,7 @@ std::vector<double> YamlValue::read_numbers(std::size_t count) const {
 
 std::vector<YamlValue> YamlValue::read_list() const {
   if (node_->kind != YamlNode::Kind::list)
-    throw make_error("should be a list, not " + describe_yaml_value(*node_));
+    throw make_error("should be a list, not " + describe_value(*node_));
   std::vector<YamlValue> items;
   items.reserve(node_->children.size());
   for (const YamlNode& item : node_->children) {
@@ -308,7 +307,7 @@ std::vector<YamlValue> YamlValue::read_list() const {
 
 YamlMap YamlValue::read_mapping() const {
   if (node_->kind != YamlNode::Kind::map) {
-    throw make_error("should be a mapping of keys to values, not " + describe_yaml_value(*node_));
+    throw make_error("should be a mapping of keys to values, not " + describe_value(*node_));
   }
   return {node_, file_, key_};
 }
@@ -317,8 +316,8 @@ InputError YamlValue::make_error(const std::string& problem) const {
   return {*file_, line_, key_, problem};
 }
 
-InputError YamlValue::make_unknown_word_error(const std::string& known) const {
-  return make_error(describe_yaml_value(*node_) + " is unknown; " + known);
+InputError YamlValue::make_word_error(const std::string& known) const {
+  return make_error(describe_value(*node_) + " is unknown; " + known);
 }
 
 void YamlField::check(bool is_valid, std::string_view problem) const {

@@ -62,7 +62,7 @@ class YamlValue {
 
   InputError make_error(const std::string& problem) const;
   /// Returns the error for a word that is not among the valid ones, `known`.
-  InputError make_unknown_word_error(const std::string& known) const;
+  InputError make_word_error(const std::string& known) const;
 
  private:
   YamlPart node_;

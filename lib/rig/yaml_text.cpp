@@ -8,7 +8,7 @@
 
 namespace vlp {
 
-std::size_t count_bytes_of_utf8_character(std::string_view text) {
+std::size_t count_utf8_character(std::string_view text) {
   const auto first = static_cast<unsigned char>(text.front());
   if (first < 0x80) return 1;
   const auto length = static_cast<std::size_t>(std::countl_one(first));
@@ -24,7 +24,7 @@ std::size_t count_bytes_of_utf8_character(std::string_view text) {
   return code < min_code[length] || code > 0x10ffff || surrogate ? 0 : length;
 }
 
-std::string format_shortest_exact_number(double value) {
+std::string format_exact_number(double value) {
   char text[32];
   std::string digits(text, std::to_chars(text, text + sizeof text, value).ptr);
   const std::size_t exponent = digits.find('e');
@@ -36,21 +36,19 @@ std::string format_shortest_exact_number(double value) {
 
 std::string truncate_text(std::string_view text, std::size_t max_bytes) {
   if (text.size() <= max_bytes) return std::string(text);
-  return std::string(text.substr(0, count_bytes_of_utf8_prefix(text.substr(0, max_bytes)))) + "...";
+  return std::string(text.substr(0, count_utf8_prefix(text.substr(0, max_bytes)))) + "...";
 }
 
-std::string quote_text_for_message(std::string_view text) {
-  return "'" + truncate_text(text, 40) + "'";
-}
+std::string quote_for_message(std::string_view text) { return "'" + truncate_text(text, 40) + "'"; }
 
-std::size_t line_number_of_yaml_mark(const YAML::Mark& mark) {
+std::size_t line_of_mark(const YAML::Mark& mark) {
   return mark.is_null() ? 0 : static_cast<std::size_t>(mark.line) + 1;
 }
 
-std::size_t count_bytes_of_utf8_prefix(std::string_view text) {
+std::size_t count_utf8_prefix(std::string_view text) {
   std::size_t valid = 0;
   while (valid < text.size()) {
-    const std::size_t length = count_bytes_of_utf8_character(text.substr(valid));
+    const std::size_t length = count_utf8_character(text.substr(valid));
     if (length == 0) break;
     valid += length;
   }

@@ -11,7 +11,7 @@ namespace vlp {
 
 void write_value(YamlWriter& out, double value) {
   if (!std::isfinite(value)) throw std::invalid_argument("a number to be saved is not finite");
-  out << format_shortest_exact_number(value);
+  out << format_exact_number(value);
 }
 
 }  // namespace vlp

@@ -140,7 +140,7 @@ void write_value(YamlWriter& out, const T& value, const Context&... context) {
 
 /// Formats a document of a described type; its first key is `format`.
 template <typename T>
-std::string format_yaml_document(const std::string& format, const T& value) {
+std::string format_document(const std::string& format, const T& value) {
   YAML::Emitter out;
   out << YAML::BeginMap;
   YamlWriter writer(out);

@@ -25,15 +25,14 @@ namespace vlp {
 namespace {
 
 /// Returns the pivot of each image of a rotation in place: one pivot per height.
-std::map<std::string, std::string> find_pivot_of_images(const AdjustSet& set,
-                                                        const AdjustStepInput& input,
-                                                        AdjustStepResult& result) {
-  const RotationCaptures turn =
-      find_in_place_rotation_captures(set.frames, input.lamps, input.calibration.camera);
+std::map<std::string, std::string> collect_pivots(const AdjustSet& set,
+                                                  const AdjustStepInput& input,
+                                                  AdjustStepResult& result) {
+  const RotationCaptures turn = detect_pivots(set.frames, input.lamps, input.calibration.camera);
   std::map<std::string, std::string> pivots;
   if (turn.status != RotationStatus::ok) {
     result.warnings.push_back(fmt::format("{} is not treated as a rotation in place: {}", set.name,
-                                          describe_rotation_status(turn.status)));
+                                          describe_status(turn.status)));
     return pivots;
   }
   for (const RotationCapture& capture : turn.captures) {
@@ -70,8 +69,7 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
                        "has a lens covariance already; leave --lens-sd-px out");
     }
     if (!report) report.emplace();
-    report->covariance =
-        compute_intrinsics_covariance_from_pixel_sd(all.calibration.camera, *input.lens_sd_px);
+    report->covariance = make_intrinsics_covariance(all.calibration.camera, *input.lens_sd_px);
   }
   for (Lamp& lamp : all.lamps.lamps) {
     if (!lamp.sd_m) lamp.sd_m = input.map_sd_m;
@@ -84,7 +82,7 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
     }
   }
   for (const AdjustSet& set : input.sets) {
-    const auto turned = set.is_in_place_rotation ? find_pivot_of_images(set, input, result)
+    const auto turned = set.is_in_place_rotation ? collect_pivots(set, input, result)
                                                  : std::map<std::string, std::string>();
     int without_sd = 0;
     for (const Frame& frame : set.frames) {
@@ -98,10 +96,9 @@ AdjustmentInput make_adjustment_input(const AdjustStepInput& input, AdjustStepRe
         capture.pivot = set.name + "/" + spot->second;
       }
       capture.known_position = make_known_place(capture_entry, set, input, without_sd);
-      capture.motion = find_capture_motion(capture_entry, input.motion, input.yaw_rate_sd_rad_per_s)
+      capture.motion = find_motion(capture_entry, input.motion, input.yaw_rate_sd_rad_per_s)
                            .value_or(KnownMotion());
-      if (may_camera_move_during_readout(capture.motion))
-        check_row_time_and_readout_known(input.calibration.camera);
+      if (may_move(capture.motion)) check_timing_known(input.calibration.camera);
       all.captures.push_back(std::move(capture));
     }
     if (without_sd > 0) {
@@ -153,8 +150,7 @@ void add_warnings(AdjustStepResult& result, const MapErrors& map_errors) {
 
 }  // namespace
 
-void replace_duplicate_set_names_by_paths(std::vector<AdjustSet>& sets,
-                                          const std::vector<std::string>& paths) {
+void make_set_names_unique(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths) {
   std::vector<std::string> names;
   names.reserve(sets.size());
   for (const AdjustSet& set : sets) names.push_back(set.name);
@@ -167,9 +163,9 @@ void replace_duplicate_set_names_by_paths(std::vector<AdjustSet>& sets,
   }
 }
 
-AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, HistoryEntry entry) {
+AdjustStepResult run_adjust_step(const AdjustStepInput& input, HistoryEntry entry) {
   AdjustStepResult result;
-  const Calibration alone = extract_camera_only_calibration(input.calibration);
+  const Calibration alone = extract_camera(input.calibration);
   const AdjustmentInput all = make_adjustment_input(input, result);
   // The check of the map assumes level captures: it skips inclined ones.
   LampCaptures captures{{}, all.lamps, input.lamps_file, input.calibration};
@@ -178,18 +174,17 @@ AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, History
     captures.frames.push_back({capture.name, capture.detections});
     captures.motions.push_back(capture.motion);
   }
-  const MapErrors map_errors = check_lamp_map_with_captures(captures, alone, result);
+  const MapErrors map_errors = check_lamp_map(captures, alone, result);
   if (!result.has_succeeded()) return result;
-  result.adjustment = run_bundle_adjustment(all);
+  result.adjustment = adjust_bundle(all);
   const AdjustmentResult& found = result.adjustment;
   if (!found.has_succeeded()) {
     result.set_step_failure(StepFailure::undetermined, found.undetermined);
-    explain_failure_by_lamp_map_errors(captures, alone, result);
+    explain_by_map_errors(captures, alone, result);
     return result;
   }
   add_warnings(result, map_errors);
-  result.metrics = {
-      {"tilt_deg", deg_from_rad(compute_tilt_from_rotation_center(found.center).angle_rad)}};
+  result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(found.center).angle_rad)}};
   if (const auto& arm_m = found.center.lever_arm_m) {
     result.metrics.push_back({"lever_arm_mm", 1e3 * arm_m->norm()});
   }
@@ -204,14 +199,13 @@ AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, History
   auto& report = calibration.intrinsics_report;
   const Eigen::MatrixXd& covariance =
       input.refine_map ? found.refined_covariance : found.surveyed_covariance;
-  const Eigen::Index n = count_intrinsics_with_covariance(found.camera),
+  const Eigen::Index n = count_intrinsics(found.camera),
                      rows = covariance.rows() - (report && report->covariance ? 0 : n);
   if (report && report->covariance) report->covariance = covariance.topLeftCorner(n, n);
-  JointCovariance joint = make_adjusted_covariance(found.camera, std::move(lamps),
-                                                   covariance.bottomRightCorner(rows, rows));
-  result.calibration =
-      add_adjustment_to_calibration(std::move(calibration), found.center, std::move(adjustment),
-                                    std::move(joint), std::move(entry));
+  JointCovariance joint =
+      make_covariance(found.camera, std::move(lamps), covariance.bottomRightCorner(rows, rows));
+  result.calibration = add_adjustment(std::move(calibration), found.center, std::move(adjustment),
+                                      std::move(joint), std::move(entry));
   return result;
 }
 

@@ -28,10 +28,9 @@ struct AdjustSet {
 /// Replaces the names of sets that share one name by their paths, because a pivot is identified by
 /// the name of its set. `paths` are in the order of `sets`. Throws std::invalid_argument if a path
 /// occurs twice.
-void replace_duplicate_set_names_by_paths(std::vector<AdjustSet>& sets,
-                                          const std::vector<std::string>& paths);
+void make_set_names_unique(std::vector<AdjustSet>& sets, const std::vector<std::string>& paths);
 
-/// Input of run_joint_adjustment_step().
+/// Input of run_adjust_step().
 struct AdjustStepInput {
   std::vector<AdjustSet> sets;
   LampMap lamps;
@@ -42,17 +41,17 @@ struct AdjustStepInput {
   /// std::nullopt: none.
   std::optional<double> map_sd_m, position_sd_m;
   /// Standard deviation of a lens without a covariance
-  /// (compute_intrinsics_covariance_from_pixel_sd()). std::nullopt: such a lens is exact.
+  /// (make_intrinsics_covariance()). std::nullopt: such a lens is exact.
   std::optional<double> lens_sd_px = {};
   /// Motion of captures without velocity and yaw rate in captures.csv, and the standard deviation
-  /// of the yaw rates in captures.csv (find_capture_motion()).
+  /// of the yaw rates in captures.csv (find_motion()).
   std::optional<KnownMotion> motion = {};
   double yaw_rate_sd_rad_per_s = 0;
   /// Keeps the covariance and the lamps of the refined map; otherwise those of the surveyed map.
   bool refine_map = false;
 };
 
-/// Result of run_joint_adjustment_step().
+/// Result of run_adjust_step().
 struct AdjustStepResult : StepResult {
   AdjustmentResult adjustment;
 };
@@ -69,6 +68,6 @@ struct AdjustStepResult : StepResult {
 ///     already
 /// @throws std::invalid_argument if the camera moves and its calibration lacks row_time_s or
 /// readout
-AdjustStepResult run_joint_adjustment_step(const AdjustStepInput& input, HistoryEntry entry);
+AdjustStepResult run_adjust_step(const AdjustStepInput& input, HistoryEntry entry);
 
 }  // namespace vlp

@@ -49,7 +49,7 @@ struct Outliers {
 };
 
 /// Finds the errors of at least `min_size` and kMinRatio times the median; none among few errors.
-Outliers find_outliers(const std::vector<CaptureError>& errors, double min_size) {
+Outliers collect_outliers(const std::vector<CaptureError>& errors, double min_size) {
   Outliers found;
   if (errors.size() < kMinErrors) return found;
   for (const CaptureError& error : errors) found.all.push_back(error.size);
@@ -67,8 +67,8 @@ Outliers find_outliers(const std::vector<CaptureError>& errors, double min_size)
 
 }  // namespace
 
-std::string describe_position_error_outliers(const std::vector<CaptureError>& errors_m) {
-  const Outliers outliers = find_outliers(errors_m, kMinOutlierError_m);
+std::string describe_error_outliers(const std::vector<CaptureError>& errors_m) {
+  const Outliers outliers = collect_outliers(errors_m, kMinOutlierError_m);
   if (outliers.captures.empty()) return "";
   const double max_mm = kMmPerM * outliers.max, others_mm = kMmPerM * upper_median(outliers.others);
   if (outliers.captures.size() == 1) {
@@ -85,7 +85,7 @@ std::string describe_position_error_outliers(const std::vector<CaptureError>& er
 }
 
 std::string describe_residual_outliers(const std::vector<CaptureError>& residuals_px) {
-  const Outliers outliers = find_outliers(residuals_px, kMinResidual_px);
+  const Outliers outliers = collect_outliers(residuals_px, kMinResidual_px);
   if (outliers.captures.size() < 2) return "";
   return fmt::format(
       "the lamps in captures {} do not fit lens and tilt of the others (residuals up to {:.2f} px, "

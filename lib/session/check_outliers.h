@@ -24,7 +24,7 @@ struct CaptureError {
 /// line: their errors are gross outliers of the others, more than 5 mm and 8 times the median.
 /// Returns an empty string if there are none, and for fewer than five errors. Outliers are fewer
 /// than half, because the median is typical of the others.
-std::string describe_position_error_outliers(const std::vector<CaptureError>& errors_m);
+std::string describe_error_outliers(const std::vector<CaptureError>& errors_m);
 
 /// Describes captures whose lamps do not fit the lens and tilt of the others, in one line: two
 /// captures or more have residuals above 0.2 px and 8 times the median. A single one may show a

@@ -18,10 +18,9 @@
 
 namespace vlp {
 
-KnownPositions collect_captures_at_known_positions(std::span<const Frame> frames,
-                                                   const CapturesTable& table,
-                                                   const std::optional<Eigen::Vector2d>& place_m,
-                                                   MeasuredPoint measured_point) {
+KnownPositions collect_known_captures(std::span<const Frame> frames, const CapturesTable& table,
+                                      const std::optional<Eigen::Vector2d>& place_m,
+                                      MeasuredPoint measured_point) {
   KnownPositions places;
   for (const Frame& frame : frames) {
     const auto entry = table.find(frame.image);
@@ -50,9 +49,9 @@ Fix locate_capture(const Positioner& positioner, const ReferencePointCapture& ca
 
 /// Returns the captures with places of the camera. Captures without a fix have no yaw and keep
 /// their places.
-std::vector<ReferencePointCapture> move_reference_points_to_camera(const KnownPositions& places,
-                                                                   const LampMap& lamps,
-                                                                   const Calibration& leveled) {
+std::vector<ReferencePointCapture> move_to_camera(const KnownPositions& places,
+                                                  const LampMap& lamps,
+                                                  const Calibration& leveled) {
   std::vector<ReferencePointCapture> captures = places.captures;
   const Positioner positioner(lamps, leveled);
   const Eigen::Vector2d& arm_m = *leveled.rotation_center->lever_arm_m;
@@ -111,11 +110,11 @@ using CapturesFor =
 /// Adds errors of the lens, zenith and lever arm, as far as `joint` has them, to a calibration.
 Calibration add_errors(const JointCovariance& joint, Calibration calibration,
                        const Eigen::VectorXd& errors) {
-  const Eigen::Index lens = count_intrinsics_with_covariance(calibration.camera);
+  const Eigen::Index lens = count_intrinsics(calibration.camera);
   if (joint.find_row("fx"))
-    calibration = add_error_to_calibrated_intrinsics(std::move(calibration), errors.head(lens));
+    calibration = add_intrinsics_error(std::move(calibration), errors.head(lens));
   if (const auto row = joint.find_row(kZenithParameter))
-    calibration = add_error_to_calibrated_zenith(std::move(calibration), errors.segment<2>(*row));
+    calibration = add_zenith_error(std::move(calibration), errors.segment<2>(*row));
   const auto arm = joint.find_row(kLeverArmParameter);
   if (arm && calibration.rotation_center->lever_arm_m)
     *calibration.rotation_center->lever_arm_m += errors.segment<2>(*arm);
@@ -130,7 +129,7 @@ std::optional<JointCovariance> compute_joint_covariance(
   if (!fit.covariance) return leveled.covariance;
   const auto offset_for = [&](const Calibration& perturbed) -> std::optional<Eigen::VectorXd> {
     const DispersionFit other =
-        estimate_dispersion_offset(captures_for(perturbed), input.lamps, perturbed, method, circle);
+        estimate_dispersion(captures_for(perturbed), input.lamps, perturbed, method, circle);
     if (other.status != DispersionStatus::ok) return {};
     return Eigen::VectorXd(other.dispersion.offset_px.cwiseQuotient(perturbed.camera.focal_px()));
   };
@@ -149,15 +148,14 @@ std::optional<JointCovariance> compute_joint_covariance(
       if (const auto row = joint.find_row(parameter))
         covariance.diagonal().segment<2>(*row).array() += min_step * min_step;
     }
-    jacobian_wrt_steps = estimate_solution_jacobian_wrt_errors(
+    jacobian_wrt_steps = differentiate_solution(
         [&](const Eigen::VectorXd& errors) {
           return offset_for(add_errors(joint, leveled, errors));
         },
         fit.dispersion.offset_px.cwiseQuotient(leveled.camera.focal_px()), covariance);
   }
   if (jacobian_wrt_steps) {
-    return add_offset_to_covariance(std::move(joint), fit, *jacobian_wrt_steps,
-                                    leveled.camera.focal_px());
+    return append_offset(std::move(joint), fit, *jacobian_wrt_steps, leveled.camera.focal_px());
   }
   result.warnings.push_back(fmt::format(
       "the effect of lens and zenith errors on the offset cannot be determined, and the "
@@ -179,10 +177,9 @@ void warn_about_few_captures(DispersionResult& result, DispersionMethod method) 
 
 /// Fails the step with the reason why there is no offset, and explains it by errors of the lamp map
 /// if the captures are sufficient.
-void set_dispersion_failure(DispersionResult& result, const LampCaptures& input,
-                            const Calibration& leveled) {
+void set_failure(DispersionResult& result, const LampCaptures& input, const Calibration& leveled) {
   const DispersionFit& fit = result.fit;
-  std::string why(describe_dispersion_status(fit.status));
+  std::string why(describe_status(fit.status));
   if (fit.status == DispersionStatus::no_fix) {
     why += fmt::format("; the first: {}", describe_fix_status(fit.no_fix_status));
   }
@@ -192,10 +189,10 @@ void set_dispersion_failure(DispersionResult& result, const LampCaptures& input,
   const bool is_of_captures = fit.status == DispersionStatus::too_few_captures ||
                               fit.status == DispersionStatus::single_yaw ||
                               fit.status == DispersionStatus::several_yaws;
-  if (!is_far && !is_of_captures) explain_failure_by_lamp_map_errors(input, leveled, result);
+  if (!is_far && !is_of_captures) explain_by_map_errors(input, leveled, result);
 }
 
-std::vector<Metric> make_dispersion_metrics(const DispersionFit& fit) {
+std::vector<Metric> make_metrics(const DispersionFit& fit) {
   constexpr double millimeters = 1e3;
   std::vector<Metric> metrics{{"dispersion_mm", millimeters * fit.dispersion.radius_m},
                               {"dispersion_offset_px", fit.dispersion.offset_px.norm()}};
@@ -207,13 +204,12 @@ std::vector<Metric> make_dispersion_metrics(const DispersionFit& fit) {
 
 }  // namespace
 
-DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
-                                                 const KnownPositions& places,
-                                                 DispersionMethod method, DispersionCircle circle,
-                                                 HistoryEntry entry) {
+DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPositions& places,
+                                     DispersionMethod method, DispersionCircle circle,
+                                     HistoryEntry entry) {
   DispersionResult result;
-  const Calibration leveled = remove_dispersion_from_calibration(input.calibration);
-  check_lamp_map_with_captures(input, leveled, result);
+  const Calibration leveled = remove_dispersion(input.calibration);
+  check_lamp_map(input, leveled, result);
   if (!result.has_succeeded()) return result;
   const bool of_axis = std::find(places.measured_points.begin(), places.measured_points.end(),
                                  MeasuredPoint::axis) != places.measured_points.end();
@@ -226,14 +222,13 @@ DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
     return result;
   }
   const CapturesFor captures_for = [&](const Calibration& calibration) {
-    return of_axis ? move_reference_points_to_camera(places, input.lamps, calibration)
-                   : places.captures;
+    return of_axis ? move_to_camera(places, input.lamps, calibration) : places.captures;
   };
   const std::vector<ReferencePointCapture> captures = captures_for(leveled);
-  result.fit = estimate_dispersion_offset(captures, input.lamps, leveled, method, circle);
+  result.fit = estimate_dispersion(captures, input.lamps, leveled, method, circle);
   const DispersionFit& fit = result.fit;
   if (fit.status != DispersionStatus::ok) {
-    set_dispersion_failure(result, input, leveled);
+    set_failure(result, input, leveled);
     return result;
   }
   if (!input.calibration.rotation_center) {
@@ -241,13 +236,12 @@ DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
   }
   warn_about_few_captures(result, method);
   if (!of_axis) warn_about_lever_arm(result, places, input.lamps, leveled);
-  result.metrics = make_dispersion_metrics(fit);
+  result.metrics = make_metrics(fit);
   auto covariance = compute_joint_covariance(result, captures_for, input, leveled, method, circle);
-  result.calibration = add_dispersion_to_calibration(input.calibration, fit.dispersion,
-                                                     std::move(covariance), std::move(entry));
+  result.calibration =
+      add_dispersion(input.calibration, fit.dispersion, std::move(covariance), std::move(entry));
   result.drawing = [fit] {
-    return make_dispersion_plot_drawing(
-        collect_dispersion_plot_data("Fixes at a reference point", fit));
+    return draw_dispersion(make_dispersion_plot("Fixes at a reference point", fit));
   };
   return result;
 }

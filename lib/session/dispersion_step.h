@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Captures with a known position, as input of run_dispersion_calibration_step().
+/// Captures with a known position, as input of run_dispersion_step().
 struct KnownPositions {
   std::vector<ReferencePointCapture> captures;
   /// For each capture, in the order of `captures`: states whether its known position is that of the
@@ -25,12 +25,11 @@ struct KnownPositions {
 
 /// Collects the captures at known places, with the inclinations of the table. A place is that of
 /// the table, or `place_m` of the point `measured_point` for captures without one in the table.
-KnownPositions collect_captures_at_known_positions(
-    std::span<const Frame> frames, const CapturesTable& table,
-    const std::optional<Eigen::Vector2d>& place_m = {},
-    MeasuredPoint measured_point = MeasuredPoint::camera);
+KnownPositions collect_known_captures(std::span<const Frame> frames, const CapturesTable& table,
+                                      const std::optional<Eigen::Vector2d>& place_m = {},
+                                      MeasuredPoint measured_point = MeasuredPoint::camera);
 
-/// Result of run_dispersion_calibration_step().
+/// Result of run_dispersion_step().
 struct DispersionResult : StepResult {
   DispersionFit fit;
 };
@@ -45,9 +44,8 @@ struct DispersionResult : StepResult {
 /// Metrics: dispersion_mm, dispersion_offset_px, and world_offset_mm if the world offset is known.
 /// Failures: wrong_map, wrong_place, undetermined.
 /// @pre at least one capture
-DispersionResult run_dispersion_calibration_step(const LampCaptures& input,
-                                                 const KnownPositions& places,
-                                                 DispersionMethod method, DispersionCircle circle,
-                                                 HistoryEntry entry);
+DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPositions& places,
+                                     DispersionMethod method, DispersionCircle circle,
+                                     HistoryEntry entry);
 
 }  // namespace vlp

@@ -23,9 +23,9 @@ void add_line_drive(Report& report, const Drive& drive) {
                      "no line can be fitted to its fixes: they do not determine a direction");
   }
   const std::string name = fixes.file.filename().string();
-  const auto metrics = format_line_drive_statistics(name, *fit);
+  const auto metrics = list_drive_statistics(name, *fit);
   report.metrics.insert(report.metrics.end(), metrics.begin(), metrics.end());
-  report.plots.push_back(make_line_drive_plot(name, fixes.rows, commanded_m, *fit));
+  report.plots.push_back(make_drive_plot(name, fixes.rows, commanded_m, *fit));
 }
 
 void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
@@ -38,7 +38,7 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
   if (input.line_m && !evaluation.line_fit) {
     result.warnings.emplace_back("no line is fitted: the fixes do not determine a direction");
   }
-  if (std::string warning = make_errors_below_crlb_warning(evaluation); !warning.empty()) {
+  if (std::string warning = warn_about_crlb(evaluation); !warning.empty()) {
     result.warnings.push_back(std::move(warning));
   }
   if (!result.caution.empty()) result.warnings.push_back(result.caution);
@@ -50,7 +50,7 @@ void add_warnings(EvaluateResult& result, const EvaluationInput& input) {
     result.warnings.emplace_back(
         "too few reference points or captures to distinguish a change from chance");
   }
-  for (std::string& warning : make_sample_size_warnings(evaluation)) {
+  for (std::string& warning : warn_about_sample_size(evaluation)) {
     result.notes.push_back(std::move(warning));
   }
 }
@@ -63,10 +63,10 @@ double compute_same_position_radius_m(const Calibration& calibration) {
   return repeated_m + (center && center->lever_arm_m ? 2 * center->lever_arm_m->norm() : 0);
 }
 
-EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
-                                            const std::vector<Gate>& given_gates) {
+EvaluateResult evaluate_with_truth(const EvaluationInput& input,
+                                   const std::vector<Gate>& given_gates) {
   EvaluateResult result;
-  result.evaluation = evaluate_fix_accuracy(input);
+  result.evaluation = evaluate_fixes(input);
   const Evaluation& evaluation = result.evaluation;
   if (evaluation.fixes == 0) {
     const auto& [status, count] = *std::max_element(
@@ -78,36 +78,36 @@ EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
                             input.fixes.file);
     return result;
   }
-  result.metrics = collect_evaluation_metrics(evaluation);
-  const auto gates = merge_gates(make_default_comparison_gates(result.metrics), given_gates);
-  result.caution = make_missing_fixes_warning(evaluation, check_gates(gates, result.metrics));
+  result.metrics = collect_metrics(evaluation);
+  const auto gates = merge_gates(make_comparison_gates(result.metrics), given_gates);
+  result.caution = warn_about_missing_fixes(evaluation, check_gates(gates, result.metrics));
   add_warnings(result, input);
   result.metrics.push_back({"warnings", static_cast<double>(result.warnings.size())});
   result.gates = check_gates(gates, result.metrics);
   return result;
 }
 
-std::string render_evaluation_report_html(EvaluationReport report_content) {
+std::string render_evaluation_html(EvaluationReport report_content) {
   Report& report = report_content.page;
   report.caution = report_content.result.caution;
-  report.metrics = format_evaluation_statistics(report_content.result.evaluation);
+  report.metrics = list_statistics(report_content.result.evaluation);
   report.notes = make_evaluation_notes(report_content.result.evaluation);
   report.title = "Accuracy report: " + report_content.input.fixes.file.filename().string();
   if (report.calibration && !report.calibration->camera.id.empty()) {
     report.title = "Accuracy report: " + report.calibration->camera.id;
   }
   for (const Drive& drive : report_content.drives) add_line_drive(report, drive);
-  for (auto& picture : make_position_error_plots(
-           report_content.input, report_content.result.evaluation, report_content.lamps)) {
+  for (auto& picture : make_error_plots(report_content.input, report_content.result.evaluation,
+                                        report_content.lamps)) {
     report.plots.push_back(std::move(picture));
   }
   if (report.calibration) {
-    auto budget = make_fix_error_budget_plot(report_content.input.fixes.rows, report_content.lamps,
-                                             *report.calibration);
+    auto budget = make_budget_plot(report_content.input.fixes.rows, report_content.lamps,
+                                   *report.calibration);
     if (budget) report.plots.push_back(std::move(*budget));
   }
   if (report.evaluation) report.evaluation->part = "evaluation";
-  render_report_plots(report.plots);
+  render_plots(report.plots);
   return render_report_html(report);
 }
 

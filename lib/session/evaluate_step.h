@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Result of evaluate_fixes_against_truth().
+/// Result of evaluate_with_truth().
 struct EvaluateResult : StepResult {
   Evaluation evaluation;
   /// Caution to be shown with the verdict, one line: captures have no fix, and no gate limits their
@@ -26,10 +26,9 @@ struct EvaluateResult : StepResult {
 double compute_same_position_radius_m(const Calibration& calibration);
 
 /// Evaluates fixes against ground truth. Metrics: all that gates can limit
-/// (collect_evaluation_metrics()). Failure: undetermined, if no capture has a fix. Throws
+/// (collect_metrics()). Failure: undetermined, if no capture has a fix. Throws
 /// InputError if the image names do not match.
-EvaluateResult evaluate_fixes_against_truth(const EvaluationInput& input,
-                                            const std::vector<Gate>& gates);
+EvaluateResult evaluate_with_truth(const EvaluationInput& input, const std::vector<Gate>& gates);
 
 /// Fixes of a drive along a commanded straight line, and the ends of this line in the world, m.
 struct Drive {
@@ -44,13 +43,13 @@ struct EvaluationReport {
   LampMap lamps;
   std::vector<Drive> drives;
   /// Other content: the gates of all steps, the calibration, its plots, and the history entry of
-  /// the evaluation. render_evaluation_report_html() adds title, metrics, notes and plots of the
+  /// the evaluation. render_evaluation_html() adds title, metrics, notes and plots of the
   /// fixes.
   Report page;
 };
 
 /// Renders the report as HTML (render_report_html()). Throws InputError if no line can be fitted to
 /// a drive.
-std::string render_evaluation_report_html(EvaluationReport report);
+std::string render_evaluation_html(EvaluationReport report);
 
 }  // namespace vlp

@@ -6,9 +6,9 @@
 
 namespace vlp {
 
-std::optional<KnownMotion> find_capture_motion(const Capture& capture,
-                                               const std::optional<KnownMotion>& default_motion,
-                                               double yaw_rate_sd_rad_per_s) {
+std::optional<KnownMotion> find_motion(const Capture& capture,
+                                       const std::optional<KnownMotion>& default_motion,
+                                       double yaw_rate_sd_rad_per_s) {
   if (!capture.velocity_m_per_s && !capture.yaw_rate_rad_per_s) return default_motion;
   KnownMotion motion = default_motion.value_or(KnownMotion());
   if (capture.velocity_m_per_s) {
@@ -22,7 +22,7 @@ std::optional<KnownMotion> find_capture_motion(const Capture& capture,
   return motion;
 }
 
-std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
+std::vector<KnownMotion> list_capture_motions(std::span<const Frame> frames,
                                               const CapturesTable& captures,
                                               const std::optional<KnownMotion>& default_motion,
                                               double yaw_rate_sd_rad_per_s) {
@@ -31,17 +31,17 @@ std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
   bool any = false;
   for (const Frame& frame : frames) {
     const auto entry = captures.find(frame.image);
-    const auto known = entry == captures.end() ? default_motion
-                                               : find_capture_motion(entry->second, default_motion,
-                                                                     yaw_rate_sd_rad_per_s);
+    const auto known = entry == captures.end()
+                           ? default_motion
+                           : find_motion(entry->second, default_motion, yaw_rate_sd_rad_per_s);
     motions.push_back(known.value_or(KnownMotion()));
-    any = any || may_camera_move_during_readout(motions.back());
+    any = any || may_move(motions.back());
   }
   if (!any) motions.clear();
   return motions;
 }
 
-void check_row_time_and_readout_known(const Camera& camera) {
+void check_timing_known(const Camera& camera) {
   if (camera.row_time_s && camera.readout) return;
   throw std::invalid_argument(
       "a moving camera needs row_time_s and readout in its calibration; give --row-time-s and "

@@ -33,19 +33,19 @@ struct LampCaptures {
 /// @param default_motion              motion without a table; std::nullopt: the camera stands
 /// @param yaw_rate_sd_rad_per_s  standard deviation of the table's yaw rate; the standard deviation
 ///                               of its velocity is in the table
-std::optional<KnownMotion> find_capture_motion(const Capture& capture,
-                                               const std::optional<KnownMotion>& default_motion,
-                                               double yaw_rate_sd_rad_per_s);
+std::optional<KnownMotion> find_motion(const Capture& capture,
+                                       const std::optional<KnownMotion>& default_motion,
+                                       double yaw_rate_sd_rad_per_s);
 
-/// Returns find_capture_motion() for each frame; an empty vector if the camera stands in all of
+/// Returns find_motion() for each frame; an empty vector if the camera stands in all of
 /// them.
-std::vector<KnownMotion> find_capture_motions(std::span<const Frame> frames,
+std::vector<KnownMotion> list_capture_motions(std::span<const Frame> frames,
                                               const CapturesTable& captures,
                                               const std::optional<KnownMotion>& default_motion,
                                               double yaw_rate_sd_rad_per_s);
 
 /// Checks that the camera has row_time_s and readout, which motion compensation requires. Throws
 /// std::invalid_argument otherwise.
-void check_row_time_and_readout_known(const Camera& camera);
+void check_timing_known(const Camera& camera);
 
 }  // namespace vlp

@@ -55,17 +55,16 @@ void fail_without_views(const LensInput& input, LensResult& result) {
   const std::string layout = check_board_layout(input.board, views, {}).problem;
   if (!layout.empty())
     return result.set_step_failure(StepFailure::wrong_board, layout, input.board_file);
-  result.set_step_failure(StepFailure::undetermined,
-                          describe_why_no_image_is_kept(input.observations.images));
+  result.set_step_failure(StepFailure::undetermined, explain_no_image(input.observations.images));
 }
 
 }  // namespace
 
-LensResult run_lens_calibration_step(LensInput input, HistoryEntry entry) {
+LensResult run_lens_step(LensInput input, HistoryEntry entry) {
   LensResult result;
-  add_image_intake_remarks(input.observations, result);
+  add_intake_remarks(input.observations, result);
   if (!result.has_succeeded()) return result;
-  LensViews views{collect_board_views_of_kept_images(input.observations.images),
+  LensViews views{collect_board_views(input.observations.images),
                   input.board,
                   input.camera.lens_model,
                   input.held_out,
@@ -84,7 +83,7 @@ LensResult run_lens_calibration_step(LensInput input, HistoryEntry entry) {
   }
   if (!lens.has_succeeded()) {
     std::string problem = lens.problem;
-    const std::string rejections = summarize_image_rejections(input.observations.images);
+    const std::string rejections = summarize_rejected_images(input.observations.images);
     if (lens.status == LensStatus::too_few_views && !rejections.empty()) {
       problem += "; not used: " + rejections;
     }
@@ -92,13 +91,12 @@ LensResult run_lens_calibration_step(LensInput input, HistoryEntry entry) {
     return result;
   }
   const Camera camera = make_camera(input.camera, lens.solution.problem);
-  result.calibration = make_camera_only_calibration(camera, make_report(lens), std::move(entry));
+  result.calibration = make_calibration(camera, make_report(lens), std::move(entry));
   result.metrics = collect_lens_metrics(lens);
   const std::string title = fmt::format("{}, {}", camera.id, lens_model_name(camera.lens_model));
   result.drawing = [title, solution = lens.solution, lattice = *lens.lattice,
                     sharpness = lens.sharpness] {
-    return make_intrinsics_plot_drawing(
-        collect_intrinsics_plot_data(title, solution, lattice, sharpness));
+    return draw_intrinsics(make_intrinsics_plot(title, solution, lattice, sharpness));
   };
   return result;
 }
@@ -123,7 +121,7 @@ std::vector<Metric> collect_lens_metrics(const LensEstimate& lens) {
   return metrics;
 }
 
-std::vector<Gate> make_default_lens_gates() {
+std::vector<Gate> make_lens_gates() {
   return {{"rms_px", 1}, {"expected_max_error_px", 2}, {"split_half_px", 1}, {"coverage", 0.4},
           {"views", 6},  {"board_tilt_deg", 20}};
 }

@@ -28,7 +28,7 @@ struct LensInput {
   bool choose_lens_model = false;
 };
 
-/// Result of run_lens_calibration_step().
+/// Result of run_lens_step().
 struct LensResult : StepResult {
   LensEstimate lens;
 };
@@ -36,7 +36,7 @@ struct LensResult : StepResult {
 /// Estimates the lens from images of a board, with its uncertainty (estimate_lens()).
 /// Warnings and skipped images include those of the intake. Metrics: collect_lens_metrics().
 /// Failures: wrong_board, undetermined. Throws std::invalid_argument as BoardLattice does.
-LensResult run_lens_calibration_step(LensInput input, HistoryEntry entry);
+LensResult run_lens_step(LensInput input, HistoryEntry entry);
 
 /// Returns the metrics rms_px, expected_max_error_px, coverage, views and board_tilt_deg, and if
 /// available
@@ -57,6 +57,6 @@ std::vector<Metric> collect_lens_metrics(const LensEstimate& lens);
 ///
 /// The last three require a tilted board in several places over most of the image, which the
 /// metrics of the fit do not check.
-std::vector<Gate> make_default_lens_gates();
+std::vector<Gate> make_lens_gates();
 
 }  // namespace vlp

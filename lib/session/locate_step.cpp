@@ -32,14 +32,14 @@
 
 namespace vlp {
 
-Sensors make_capture_sensor_readings(const std::string& image, const LocateInput& input) {
+Sensors make_sensor_readings(const std::string& image, const LocateInput& input) {
   Sensors sensors;
   sensors.motion = input.motion;
   sensors.inclination_sigma_rad = input.roll_pitch_sd_rad;
   const auto entry = input.captures.find(image);
   if (entry == input.captures.end()) return sensors;
   const Capture& capture = entry->second;
-  sensors.motion = find_capture_motion(capture, input.motion, input.yaw_rate_sd_rad_per_s);
+  sensors.motion = find_motion(capture, input.motion, input.yaw_rate_sd_rad_per_s);
   sensors.time_s = capture.time_s;
   if (capture.inclination) {
     sensors.inclination = capture.inclination;
@@ -59,8 +59,8 @@ Sensors make_capture_sensor_readings(const std::string& image, const LocateInput
   return sensors;
 }
 
-std::size_t count_detections_outside_image(std::span<const Frame> frames,
-                                           const std::array<int, 2>& imager_px) {
+std::size_t count_outside_image(std::span<const Frame> frames,
+                                const std::array<int, 2>& imager_px) {
   constexpr double fraction = 0.1;
   const Eigen::Array2d size(imager_px[0], imager_px[1]);
   std::size_t outside = 0;
@@ -89,7 +89,7 @@ class EarlierFrames {
       by_time_.emplace(*entry->second.time_s, i);
     }
   }
-  std::vector<EarlierFrame> list_earlier_frames(const std::optional<double>& time_s) const {
+  std::vector<EarlierFrame> list_earlier(const std::optional<double>& time_s) const {
     std::vector<EarlierFrame> earlier;
     if (!time_s) return earlier;
     auto at = by_time_.lower_bound(*time_s);
@@ -114,7 +114,7 @@ class EarlierFrames {
 /// estimates the fix of the frame alone.
 Fix locate_frame(const Frame& frame, const Positioner& positioner, const EarlierFrames& frames,
                  const Sensors& sensors) {
-  const auto earlier = frames.list_earlier_frames(sensors.time_s);
+  const auto earlier = frames.list_earlier(sensors.time_s);
   if (!earlier.empty() && sensors.motion) {
     const Fix joint_fix = positioner.compute_position_fix(frame.detections, sensors, earlier);
     if (joint_fix.has_succeeded()) return joint_fix;
@@ -130,7 +130,7 @@ std::vector<Fix> locate_all_frames(const LocateInput& input,
   fixes.reserve(input.frames.size());
   for (const Frame& frame : input.frames) {
     fixes.push_back(
-        locate_frame(frame, positioner, frames, make_capture_sensor_readings(frame.image, input)));
+        locate_frame(frame, positioner, frames, make_sensor_readings(frame.image, input)));
   }
   return fixes;
 }
@@ -139,14 +139,14 @@ void check_motion(const LocateInput& input) {
   const bool motion =
       input.motion ||
       std::any_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
-        const auto known = make_capture_sensor_readings(frame.image, input).motion;
-        return known && may_camera_move_during_readout(*known);
+        const auto known = make_sensor_readings(frame.image, input).motion;
+        return known && may_move(*known);
       });
-  if (motion) check_row_time_and_readout_known(input.calibration.camera);
+  if (motion) check_timing_known(input.calibration.camera);
 }
 
 /// Returns the input with LocateInput::sigma_px in all detections.
-LocateInput apply_given_pixel_noise(LocateInput input) {
+LocateInput apply_given_noise(LocateInput input) {
   for (Frame& frame : input.frames) {
     for (Detection& detection : frame.detections) detection.sigma_px = input.sigma_px;
   }
@@ -225,7 +225,7 @@ bool warn_about_noise(LocateResult& result, const std::vector<Frame>& frames, do
     }
   }
   constexpr double max_noise_ratio = 3;
-  const auto estimated_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
+  const auto estimated_px = estimate_noise_px(sum_fix_residuals(result.fixes));
   if (estimated_px && stated_px > 0) {
     result.metrics.push_back({"residual_ratio", *estimated_px / stated_px});
   }
@@ -242,14 +242,14 @@ bool warn_about_noise(LocateResult& result, const std::vector<Frame>& frames, do
 /// Returns true if no motion of the camera is given.
 bool is_assumed_standing(const LocateInput& input) {
   return std::none_of(input.frames.begin(), input.frames.end(), [&](const Frame& frame) {
-    return make_capture_sensor_readings(frame.image, input).motion.has_value();
+    return make_sensor_readings(frame.image, input).motion.has_value();
   });
 }
 
 /// Returns true if roll and pitch of no camera are given or estimated.
 bool is_assumed_level(const LocateInput& input) {
   return std::ranges::none_of(input.frames, [&](const Frame& frame) {
-    const Sensors sensors = make_capture_sensor_readings(frame.image, input);
+    const Sensors sensors = make_sensor_readings(frame.image, input);
     return sensors.inclination || sensors.inclination_sigma_rad > 0;
   });
 }
@@ -302,9 +302,9 @@ std::optional<std::vector<Fix>> find_better_fixes(const LocateResult& result,
                                                   const PositionerOptions& options, bool is_noisy) {
   const std::size_t failed = other.frames.size() - count_fixes(result.fixes);
   std::vector<Fix> fixes = locate_all_frames(other, options);
-  const ResidualSums residuals = sum_squared_residuals_of_fixes(fixes);
-  const auto noise_px = estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
-  const auto other_px = estimate_pixel_noise_px(residuals);
+  const ResidualSums residuals = sum_fix_residuals(fixes);
+  const auto noise_px = estimate_noise_px(sum_fix_residuals(result.fixes));
+  const auto other_px = estimate_noise_px(residuals);
   const bool fits = is_noisy ? other_px && *other_px < *noise_px / 2
                              : 2 * (other.frames.size() - count_fixes(fixes)) < failed;
   // More unknowns fit the errors if there are few residuals.
@@ -325,7 +325,7 @@ std::optional<Explanation> explain_by_motion(const LocateResult& result, const L
   const auto speed_m_per_s = fixes ? find_speed_m_per_s(*fixes) : std::nullopt;
   if (!speed_m_per_s || *speed_m_per_s > max_speed_m_per_s) return std::nullopt;
   return Explanation{
-      estimate_pixel_noise_px(sum_squared_residuals_of_fixes(*fixes)).value_or(0),
+      estimate_noise_px(sum_fix_residuals(*fixes)).value_or(0),
       // [FIX-14] `fit a moving camera` | motion or tilt is not stated | state it, or the option
       fmt::format("the images fit a moving camera, at {:.2g} m/s: state velocities in "
                   "captures.csv, or --max-speed-m-per-s",
@@ -342,7 +342,7 @@ std::optional<Explanation> explain_by_tilt(const LocateResult& result, const Loc
   const auto tilt_rad = fixes ? find_tilt_rad(*fixes) : std::nullopt;
   if (!tilt_rad) return std::nullopt;
   return Explanation{
-      estimate_pixel_noise_px(sum_squared_residuals_of_fixes(*fixes)).value_or(0),
+      estimate_noise_px(sum_fix_residuals(*fixes)).value_or(0),
       // [FIX-14] `fit a tilted camera`
       fmt::format("the images fit a tilted camera, by {:.2g} degrees: state inclinations in "
                   "captures.csv, or --roll-pitch-sd-deg",
@@ -351,7 +351,7 @@ std::optional<Explanation> explain_by_tilt(const LocateResult& result, const Loc
 
 /// Warns if motion or tilt explains failed frames or residuals of a camera that is assumed to stand
 /// or to be level. Names the one that leaves less noise.
-void warn_about_motion_or_tilt(LocateResult& result, const LocateInput& input, bool is_noisy) {
+void warn_about_motion(LocateResult& result, const LocateInput& input, bool is_noisy) {
   const std::size_t failed = input.frames.size() - count_fixes(result.fixes);
   if (!is_noisy && 2 * failed < input.frames.size()) return;
   const auto motion = explain_by_motion(result, input, is_noisy);
@@ -380,8 +380,8 @@ LocateInput scale_stated_noise(LocateInput input, const std::vector<Fix>& fixes,
 }
 
 /// Locates frames again, with scaled noise, from the lamps that their fixes use.
-void locate_with_scaled_noise(const LocateInput& input, const PositionerOptions& positioner_options,
-                              double factor, std::vector<Fix>& fixes) {
+void locate_scaled(const LocateInput& input, const PositionerOptions& positioner_options,
+                   double factor, std::vector<Fix>& fixes) {
   std::vector<Fix> rescaled =
       locate_all_frames(scale_stated_noise(input, fixes, factor), positioner_options);
   for (std::size_t i = 0; i < fixes.size(); ++i) {
@@ -394,8 +394,7 @@ void locate_with_scaled_noise(const LocateInput& input, const PositionerOptions&
 }
 
 /// Estimates the noise of the frames of which all detections state one, or of the others.
-NoiseScale estimate_noise_scale_of_frames(const LocateInput& input, const std::vector<Fix>& fixes,
-                                          bool is_stated) {
+NoiseScale estimate_scale(const LocateInput& input, const std::vector<Fix>& fixes, bool is_stated) {
   std::vector<Frame> frames;
   std::vector<Fix> selected;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
@@ -413,8 +412,8 @@ NoiseScale estimate_noise_scale_of_frames(const LocateInput& input, const std::v
 bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   PositionerOptions positioner_options = input.positioner_options;
   result.fixes = locate_all_frames(input, positioner_options);
-  const NoiseScale stated = estimate_noise_scale_of_frames(input, result.fixes, true);
-  const NoiseScale unstated = estimate_noise_scale_of_frames(input, result.fixes, false);
+  const NoiseScale stated = estimate_scale(input, result.fixes, true);
+  const NoiseScale unstated = estimate_scale(input, result.fixes, false);
   const bool are_all_stated = std::ranges::all_of(input.frames, has_pixel_noise);
   // Fewer degrees of freedom determine the factor to 22 % at best.
   constexpr double min_degrees_of_freedom = 10;
@@ -422,7 +421,7 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
       stated.degrees_of_freedom >= min_degrees_of_freedom ? std::max(1.0, stated.factor) : 1;
   bool is_noisy = false;
   if (are_all_stated) is_noisy = warn_about_noise(result, input.frames, factor);
-  warn_about_motion_or_tilt(result, input, is_noisy);
+  warn_about_motion(result, input, is_noisy);
   constexpr double chance_sds = 3;
   if (!is_noisy && factor > 1 + chance_sds * std::sqrt(0.5 / stated.degrees_of_freedom)) {
     result.notes.push_back(fmt::format(
@@ -432,10 +431,9 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
   if (!are_all_stated) {
     // Few frames without given noise may have no redundancy: then the noise in pixels is estimated
     // from all frames.
-    const auto unstated_factor =
-        unstated.degrees_of_freedom > 0
-            ? std::optional(unstated.factor)
-            : estimate_pixel_noise_px(sum_squared_residuals_of_fixes(result.fixes));
+    const auto unstated_factor = unstated.degrees_of_freedom > 0
+                                     ? std::optional(unstated.factor)
+                                     : estimate_noise_px(sum_fix_residuals(result.fixes));
     is_known = unstated_factor.has_value();
     if (is_known) {
       positioner_options.unstated_sigma_px = std::clamp(
@@ -451,14 +449,14 @@ bool locate_with_noise(const LocateInput& input, LocateResult& result) {
     }
   }
   if (factor > 1 || (is_known && !are_all_stated)) {
-    locate_with_scaled_noise(input, positioner_options, factor, result.fixes);
+    locate_scaled(input, positioner_options, factor, result.fixes);
   }
   return is_known;
 }
 
 void warn_about_image(LocateResult& result, const LocateInput& input) {
   const auto& [width, height] = input.calibration.camera.imager_px;
-  const std::size_t outside = count_detections_outside_image(input.frames, {width, height});
+  const std::size_t outside = count_outside_image(input.frames, {width, height});
   if (outside == 0) return;
   result.warnings.push_back(
       fmt::format("{} detections are far outside the {} x {} px of the camera: is it the "
@@ -468,7 +466,7 @@ void warn_about_image(LocateResult& result, const LocateInput& input) {
 
 /// Marks the fixes that use lamps outside the calibrated region of the image, where the board was
 /// not seen.
-void mark_fixes_outside_valid_region(LocateResult& result, const LocateInput& input) {
+void mark_outside(LocateResult& result, const LocateInput& input) {
   const auto& report = input.calibration.intrinsics_report;
   if (!report || report->region_px.empty()) return;
   std::size_t outside = 0, fixes = 0;
@@ -507,18 +505,18 @@ void warn_about_captures(LocateResult& result, const LocateInput& input) {
   result.warnings.push_back(fmt::format(
       "{} of {} images are not in captures.csv: image names have to be equal ({} in the images, "
       "{} in the table)",
-      without, input.frames.size(), quote_text_for_message(input.frames.front().image),
-      quote_text_for_message(captures.begin()->first)));
+      without, input.frames.size(), quote_for_message(input.frames.front().image),
+      quote_for_message(captures.begin()->first)));
 }
 
 /// Finds errors of the lamp map from the captures in which the camera stands.
-MapErrors find_errors_while_standing(const LocateInput& input, const std::vector<Fix>& fixes) {
+MapErrors detect_standing_errors(const LocateInput& input, const std::vector<Fix>& fixes) {
   const bool below = input.lamps.lamps_below_camera;
   std::vector<Frame> frames;
   MapErrorOptions options;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    const Sensors sensors = make_capture_sensor_readings(input.frames[i].image, input);
-    if (sensors.motion && may_camera_move_during_readout(*sensors.motion)) continue;
+    const Sensors sensors = make_sensor_readings(input.frames[i].image, input);
+    if (sensors.motion && may_move(*sensors.motion)) continue;
     frames.push_back(input.frames[i]);
     options.inclinations.push_back(is_state_estimated(fixes[i], kBodyRoll)
                                        ? std::optional(fixes[i].state.motion.inclination)
@@ -529,8 +527,8 @@ MapErrors find_errors_while_standing(const LocateInput& input, const std::vector
   if (const auto& mount = input.positioner_options.mount)
     options.yaw_in_robot_rad = turn_over_if(below, *mount).yaw_in_robot_rad;
   if (input.compute_lamp_offsets) options.max_captures = std::max<std::size_t>(frames.size(), 1);
-  MapErrors found = detect_misplaced_or_swapped_lamps(frames, turn_over_if(below, input.lamps),
-                                                      input.calibration, options);
+  MapErrors found =
+      detect_map_errors(frames, turn_over_if(below, input.lamps), input.calibration, options);
   if (!below) return found;
   for (MapError& error : found.errors) error.offset_m.tail<2>() *= -1;
   for (LampOffset& offset : found.offsets) {
@@ -540,8 +538,8 @@ MapErrors find_errors_while_standing(const LocateInput& input, const std::vector
   return found;
 }
 
-void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
-                               const MapErrors& map_errors) {
+void warn_about_rejected(LocateResult& result, const LocateInput& input,
+                         const MapErrors& map_errors) {
   int unknown = 0, rejected = 0;
   std::map<int, int> captures;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
@@ -578,8 +576,8 @@ void warn_about_rejected_lamps(LocateResult& result, const LocateInput& input,
 
 }  // namespace
 
-LocateResult locate_camera_from_detections(const LocateInput& input) {
-  if (input.sigma_px) return locate_camera_from_detections(apply_given_pixel_noise(input));
+LocateResult locate_from_detections(const LocateInput& input) {
+  if (input.sigma_px) return locate_from_detections(apply_given_noise(input));
   check_motion(input);
   LocateResult result;
   const bool noise_known = locate_with_noise(input, result);
@@ -592,18 +590,18 @@ LocateResult locate_camera_from_detections(const LocateInput& input) {
       result.poses.push_back(std::move(*pose));
   }
   warn_about_image(result, input);
-  mark_fixes_outside_valid_region(result, input);
+  mark_outside(result, input);
   const int elsewhere = Positioner(input.lamps, input.calibration, input.positioner_options)
                             .num_lamps_moved_since_calibration();
-  if (elsewhere > 0) result.warnings.push_back(describe_lamps_moved_since_calibration(elsewhere));
+  if (elsewhere > 0) result.warnings.push_back(describe_moved_lamps(elsewhere));
   warn_about_captures(result, input);
   const bool is_contradicted =
       std::any_of(result.fixes.begin(), result.fixes.end(),
                   [](const Fix& fix) { return !fix.has_succeeded() || fix.rejected_lamps > 0; });
   MapErrors map_errors;
   if (input.compute_lamp_offsets || is_contradicted)
-    map_errors = find_errors_while_standing(input, result.fixes);
-  warn_about_rejected_lamps(result, input, map_errors);
+    map_errors = detect_standing_errors(input, result.fixes);
+  warn_about_rejected(result, input, map_errors);
   if (input.compute_lamp_offsets) {
     result.lamp_offsets = std::move(map_errors.offsets);
     if (input.frames.size() > 1 && result.lamp_offsets.empty()) {
@@ -625,11 +623,10 @@ LocateResult locate_camera_from_detections(const LocateInput& input) {
 namespace {
 
 /// Repeats the detection of lamps in the level plane of the fix if the tilt is estimated.
-std::vector<Light> repeat_detection_if_tilted(const LocateInput& input,
-                                              const Positioner& positioner,
-                                              const std::string& image, std::vector<Light> lights,
-                                              const LightsInPlane& detect) {
-  const Sensors sensors = make_capture_sensor_readings(image, input);
+std::vector<Light> repeat_if_tilted(const LocateInput& input, const Positioner& positioner,
+                                    const std::string& image, std::vector<Light> lights,
+                                    const LightsInPlane& detect) {
+  const Sensors sensors = make_sensor_readings(image, input);
   if (sensors.inclination_sigma_rad == 0) return lights;
   std::vector<std::vector<Light>> repetitions;
   const auto add = [&](std::vector<Light> found) {
@@ -653,31 +650,29 @@ bool has_detections(const std::vector<Frame>& frames) {
 
 }  // namespace
 
-LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, LocateInput input,
-                                       const FrontendOptions& options,
-                                       const IntakeProgress& progress) {
+LocateResult locate_from_images(const LampImages& images, ImageUse use, LocateInput input,
+                                const FrontendOptions& options, const IntakeProgress& progress) {
   LampIntake intake(images, use, options);
   if (!input.calibration.camera.readout)
     input.calibration.camera.readout = intake.readout_direction();
   const Positioner positioner(input.lamps, input.calibration, input.positioner_options);
   intake.set_repetition(
       [&](const std::string& image, std::vector<Light> lights, const LightsInPlane& detect) {
-        return repeat_detection_if_tilted(input, positioner, image, std::move(lights), detect);
+        return repeat_if_tilted(input, positioner, image, std::move(lights), detect);
       });
-  Observations seen = intake.detect_lamps_in_all_images(list_lamp_images(images.images), progress);
-  check_any_lamp_identified(images, seen);
-  input.frames = collect_lamp_frames_of_kept_images(seen.images);
+  Observations seen = intake.detect_in_all(list_lamp_images(images.images), progress);
+  check_any_identified(images, seen);
+  input.frames = collect_lamp_frames(seen.images);
   LocateResult result;
   if (has_detections(input.frames)) {
     seen.failure.reset();
-    result = locate_camera_from_detections(input);
+    result = locate_from_detections(input);
   }
-  add_image_intake_remarks(seen, result);
+  add_intake_remarks(seen, result);
   // A classifier identifies lamps without the row time: it is no reason why there is no result.
   if (options.classifier.empty() || result.has_succeeded()) {
-    add_row_time_contradiction_to_result(seen.images, input.lamps,
-                                         make_detector_camera(input.calibration),
-                                         images.calibration_file.filename().string(), result);
+    add_row_time_remark(seen.images, input.lamps, make_detector_camera(input.calibration),
+                        images.calibration_file.filename().string(), result);
   }
   result.observations = std::move(seen);
   return result;

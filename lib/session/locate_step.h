@@ -20,7 +20,7 @@
 
 namespace vlp {
 
-/// Input of locate_camera_from_detections(): captures, lamp map, calibration, and options of the
+/// Input of locate_from_detections(): captures, lamp map, calibration, and options of the
 /// positioner.
 struct LocateInput {
   std::vector<Frame> frames;
@@ -59,14 +59,13 @@ struct LocateInput {
 };
 
 /// Returns the sensor data of a capture: motion, time, inclination, height and yaw.
-Sensors make_capture_sensor_readings(const std::string& image, const LocateInput& input);
+Sensors make_sensor_readings(const std::string& image, const LocateInput& input);
 
 /// Counts the detections outside the image by more than 10 % of its width or height. The center of
 /// a lamp at the image's edge may be slightly outside.
-std::size_t count_detections_outside_image(std::span<const Frame> frames,
-                                           const std::array<int, 2>& imager_px);
+std::size_t count_outside_image(std::span<const Frame> frames, const std::array<int, 2>& imager_px);
 
-/// Result of locate_camera_from_detections().
+/// Result of locate_from_detections().
 struct LocateResult : StepResult {
   /// Fix of each frame, in the order of LocateInput::frames.
   std::vector<Fix> fixes;
@@ -77,7 +76,7 @@ struct LocateResult : StepResult {
   /// robot.
   std::vector<PoseRow> poses;
   FixSummary summary;
-  /// Observations of the images in which the lamps were detected (locate_camera_from_images()).
+  /// Observations of the images in which the lamps were detected (locate_from_images()).
   Observations observations = {};
 };
 
@@ -91,17 +90,17 @@ struct LocateResult : StepResult {
 /// Warnings: residuals larger than the reported noise explains; detections outside the image or the
 /// calibrated region (region_px); images missing in `captures`; rejected lamps.
 /// @throws std::invalid_argument if a camera moves and its calibration lacks row_time_s or readout
-LocateResult locate_camera_from_detections(const LocateInput& input);
+LocateResult locate_from_detections(const LocateInput& input);
 
-/// Detects the lamps in images (detect_lamps_in_images()) and locates the camera of each image.
+/// Detects the lamps in images (detect_lamps()) and locates the camera of each image.
 /// `input` holds everything except the frames. If the tilt of a camera is estimated, its lamps are
 /// detected again in the plane that is level by its fix (locate_with_repeated_detection()).
 ///
 /// Skipped images and remarks of the intake are part of the result. It fails as
-/// locate_camera_from_detections() does, or if no lamp is identified.
-/// @throws as detect_lamps_in_images() and locate_camera_from_detections()
-LocateResult locate_camera_from_images(const LampImages& images, ImageUse use, LocateInput input,
-                                       const FrontendOptions& options,
-                                       const IntakeProgress& progress = {});
+/// locate_from_detections() does, or if no lamp is identified.
+/// @throws as detect_lamps() and locate_from_detections()
+LocateResult locate_from_images(const LampImages& images, ImageUse use, LocateInput input,
+                                const FrontendOptions& options,
+                                const IntakeProgress& progress = {});
 
 }  // namespace vlp

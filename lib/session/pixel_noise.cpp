@@ -130,7 +130,7 @@ NoiseScale estimate_noise_scale(std::span<const Frame> frames, std::span<const F
     squares += frame.residuals.squaredNorm();
     count += static_cast<double>(frame.residuals.size());
   }
-  const auto eigen = eigendecompose_symmetric_matrix(information);
+  const auto eigen = eigendecompose(information);
   const Eigen::ArrayXd values = eigen.values.array().max(0);
   const Eigen::ArrayXd projections = (eigen.vectors.transpose() * gradient).array().square();
   double variance = squares / count, freedom = count;

@@ -17,7 +17,7 @@ namespace {
 /// A pose needs three lamps. Where lights are left out, three others may agree by chance.
 constexpr std::size_t kMinLights = 3, kMinMajority = 4;
 /// Standard deviation of roll and pitch of a camera that is mounted, or held, to look up.
-/// estimate_body_state_robust() rejects more than five times this value.
+/// estimate_robust() rejects more than five times this value.
 constexpr double kLeanSd_rad = 0.15;
 constexpr double kMaxSquare = kMaxResidualSds * kMaxResidualSds;
 
@@ -46,7 +46,7 @@ double compute_rms_spread(const std::vector<Point>& points) {
 }
 
 /// Distance on the floor plan from a lamp to the nearest other one.
-double distance_to_nearest_lamp_m(const Lamp& lamp, const LampMap& lamps) {
+double nearest_lamp_m(const Lamp& lamp, const LampMap& lamps) {
   double nearest = std::numeric_limits<double>::infinity();
   for (const Lamp& other : lamps.lamps) {
     if (other.id == lamp.id) continue;
@@ -92,11 +92,10 @@ FrameObservations make_frame(const GroupedLights& image, std::vector<AssignedLig
     const double sd_px = std::hypot(sigma_px, spread_px * std::max(sd_fraction, map_sd_fraction));
     const auto ray = lens.unproject_pixel(pixel);
     if (!ray) continue;
-    const auto whitened =
-        compute_whitened_pixel_jacobian_wrt_ray(ray->direction, ray->d_direction_d_pixel, sd_px);
+    const auto whitened = whiten_ray_jacobian(ray->direction, ray->d_direction_d_pixel, sd_px);
     if (!whitened) continue;
     frame.add_current({lamp.position_m, ray->direction.normalized(), *whitened, sd_px, 0}, lamp.id,
-                      distance_to_nearest_lamp_m(lamp, lamps));
+                      nearest_lamp_m(lamp, lamps));
     kept.push_back(light);
   }
   assigned = std::move(kept);
@@ -109,10 +108,9 @@ bool has_pose(FixStatus status) {
 }
 
 /// Squared residuals of the lights of an image from the pose that fits them best, in their order.
-std::vector<double> compute_squared_residuals_of_lights(const GroupedLights& image,
-                                                        const RowTimeCandidate& candidate,
-                                                        const LampMap& lamps, const Lens& lens,
-                                                        const Tolerance& tolerance) {
+std::vector<double> square_light_residuals(const GroupedLights& image,
+                                           const RowTimeCandidate& candidate, const LampMap& lamps,
+                                           const Lens& lens, const Tolerance& tolerance) {
   std::vector<double> squares(image.lights.size(), kMaxSquare);
   std::vector<AssignedLight> assigned = assigned_lights(image, candidate, lamps);
   if (assigned.size() < kMinLights || assigned.size() > kMaxSightings) return squares;
@@ -122,8 +120,7 @@ std::vector<double> compute_squared_residuals_of_lights(const GroupedLights& ima
   prior.set_sd(kBodyRoll, kLeanSd_rad);
   FrameObservations agreeing = frame;
   const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
-  const auto found =
-      estimate_body_state_robust(agreeing, {no_arm_m, prior}, tolerance.max_residual_fraction);
+  const auto found = estimate_robust(agreeing, {no_arm_m, prior}, tolerance.max_residual_fraction);
   if (!has_pose(found.status) || agreeing.size < std::min(frame.size, kMinMajority)) return squares;
   const auto& [roll_rad, pitch_rad] = found.fix.state.motion.inclination;
   const double lean_square = (roll_rad * roll_rad + pitch_rad * pitch_rad) /
@@ -141,7 +138,7 @@ std::vector<double> compute_squared_residuals_of_lights(const GroupedLights& ima
 }
 
 /// Returns the groups that can be one lamp at most for every candidate.
-std::vector<bool> find_unique_lamps(const RowTimeCandidates& found) {
+std::vector<bool> flag_unique_lamps(const RowTimeCandidates& found) {
   std::vector<bool> unique(found.groups.size(), true);
   for (const RowTimeCandidate& candidate : found.candidates) {
     for (std::size_t i = 0; i < unique.size(); ++i) {
@@ -153,10 +150,10 @@ std::vector<bool> find_unique_lamps(const RowTimeCandidates& found) {
 
 }  // namespace
 
-std::vector<double> compute_position_costs_of_row_time_candidates(
-    const RowTimeCandidates& found, std::span<const GroupedLights> images, const LampMap& lamps,
-    const std::optional<Lens>& lens) {
-  const std::vector<bool> unique = find_unique_lamps(found);
+std::vector<double> compute_position_costs(const RowTimeCandidates& found,
+                                           std::span<const GroupedLights> images,
+                                           const LampMap& lamps, const std::optional<Lens>& lens) {
+  const std::vector<bool> unique = flag_unique_lamps(found);
   const Tolerance& tolerance = lens ? kWithLens : kWithoutLens;
   // Squared residuals of the images by candidate and group.
   std::vector<std::vector<std::vector<double>>> squares(
@@ -166,8 +163,8 @@ std::vector<double> compute_position_costs_of_row_time_candidates(
     if (image.lights.size() < kMinLights) continue;
     const Lens lens_of_image = lens ? *lens : make_nominal_lens(image.size_px);
     for (std::size_t i = 0; i < squares.size(); ++i) {
-      const auto of_lights = compute_squared_residuals_of_lights(image, found.candidates[i], lamps,
-                                                                 lens_of_image, tolerance);
+      const auto of_lights =
+          square_light_residuals(image, found.candidates[i], lamps, lens_of_image, tolerance);
       for (std::size_t k = 0; k < of_lights.size(); ++k) {
         squares[i][image.lights[k].group].push_back(of_lights[k]);
       }

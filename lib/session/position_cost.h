@@ -39,7 +39,7 @@ struct GroupedLights {
 ///                has three lights
 ///
 /// In each image the pose of a camera below the lamps is fitted to the lights with a lamp; its roll
-/// and pitch have a prior of 0.15 rad (sd). estimate_body_state_robust() rejects a minority of
+/// and pitch have a prior of 0.15 rad (sd). estimate_robust() rejects a minority of
 /// wrong lights if four agree, and rejects a mirrored map. The squared residual of a light is
 ///
 ///     r^2 = |pixel - predicted pixel|^2 / sd^2 + (lean / 0.15 rad)^2 / lights,
@@ -60,8 +60,8 @@ struct GroupedLights {
 ///     sum over groups of log(1 + median over images of r^2).
 ///
 /// An error of the map or of the lens is the same in all images; therefore images are not summed.
-std::vector<double> compute_position_costs_of_row_time_candidates(
-    const RowTimeCandidates& found, std::span<const GroupedLights> images, const LampMap& lamps,
-    const std::optional<Lens>& lens);
+std::vector<double> compute_position_costs(const RowTimeCandidates& found,
+                                           std::span<const GroupedLights> images,
+                                           const LampMap& lamps, const std::optional<Lens>& lens);
 
 }  // namespace vlp

@@ -31,15 +31,13 @@ std::string_view rotation_method_name(RotationMethod method) {
 RotationFit fit_rotation(const RotationCaptures& rotation, const Camera& camera,
                          RotationMethod method) {
   const RotationFit axis = fit_rotation_axis(rotation, camera);
-  return method == RotationMethod::axis
-             ? axis
-             : fit_and_average_lamp_circle_centers(rotation, camera, axis).mean;
+  return method == RotationMethod::axis ? axis : fit_circle_centers(rotation, camera, axis).mean;
 }
 
 /// Returns the zenith point and, if known, the lever arm.
 Eigen::VectorXd make_solution_vector(const RotationCenter& center) {
   Eigen::VectorXd solved(center.lever_arm_m ? 4 : 2);
-  solved.head<2>() = compute_normalized_zenith_point(center);
+  solved.head<2>() = compute_zenith_point(center);
   if (center.lever_arm_m) solved.tail<2>() = *center.lever_arm_m;
   return solved;
 }
@@ -56,14 +54,12 @@ std::optional<JointCovariance> compute_joint_covariance(
   std::optional<MatrixX> jacobian(MatrixX(own->rows(), 0));
   if (!joint.parameters.empty()) {
     const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
-      const auto moved = center_for(add_error_to_calibrated_intrinsics(
-                                        extract_camera_only_calibration(input.calibration), error)
-                                        .camera);
+      const auto moved =
+          center_for(add_intrinsics_error(extract_camera(input.calibration), error).camera);
       if (!moved || moved->lever_arm_m.has_value() != center.lever_arm_m.has_value()) return {};
       return make_solution_vector(*moved);
     };
-    jacobian = estimate_solution_jacobian_wrt_errors(with_error, make_solution_vector(center),
-                                                     joint.matrix);
+    jacobian = differentiate_solution(with_error, make_solution_vector(center), joint.matrix);
   }
   if (!jacobian) {
     result.warnings.emplace_back(
@@ -97,8 +93,7 @@ std::optional<JointCovariance> compute_joint_covariance(RotationResult& result,
                                                         const LampCaptures& input,
                                                         RotationMethod method) {
   const auto center_for = [&](const Camera& camera) -> std::optional<RotationCenter> {
-    const RotationCaptures rotation =
-        find_in_place_rotation_captures(input.frames, input.lamps, camera);
+    const RotationCaptures rotation = detect_pivots(input.frames, input.lamps, camera);
     if (rotation.status != RotationStatus::ok || !has_same_observations(rotation, result.rotation))
       return {};
     const RotationFit fit = fit_rotation(rotation, camera, method);
@@ -142,9 +137,8 @@ void add_warnings(RotationResult& result) {
 
 void add_metrics(RotationResult& result, const Eigen::Vector2d& focal_px) {
   const RotationCenter& center = result.fit.center;
-  result.metrics = {
-      {"rotation_px", result.fit.residual_px},
-      {"tilt_deg", deg_from_rad(compute_tilt_from_rotation_center(center).angle_rad)}};
+  result.metrics = {{"rotation_px", result.fit.residual_px},
+                    {"tilt_deg", deg_from_rad(compute_tilt(center).angle_rad)}};
   if (!result.circles.circles.empty()) {
     result.metrics.push_back({"rotation_spread_px", result.circles.spread_px});
   }
@@ -160,19 +154,17 @@ void add_metrics(RotationResult& result, const Eigen::Vector2d& focal_px) {
 
 /// Finds errors of the map from the captures in which the camera stands. From captures of a moving
 /// camera, which shear lamps by several millimeters, finds only errors of the map as a whole.
-MapErrors find_lamp_map_errors(const LampCaptures& input, const Calibration& calibration,
+MapErrors detect_errors_in_map(const LampCaptures& input, const Calibration& calibration,
                                double min_offset_px) {
   std::vector<Frame> frames;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
-    if (input.motions.empty() || !may_camera_move_during_readout(input.motions[i]))
-      frames.push_back(input.frames[i]);
+    if (input.motions.empty() || !may_move(input.motions[i])) frames.push_back(input.frames[i]);
   }
   MapErrorOptions options;
   options.min_offset_px = min_offset_px;
-  MapErrors found = detect_misplaced_or_swapped_lamps(frames, input.lamps, calibration, options);
+  MapErrors found = detect_map_errors(frames, input.lamps, calibration, options);
   if (frames.size() == input.frames.size() || !found.errors.empty()) return found;
-  MapErrors all =
-      detect_misplaced_or_swapped_lamps(input.frames, input.lamps, calibration, options);
+  MapErrors all = detect_map_errors(input.frames, input.lamps, calibration, options);
   std::erase_if(all.errors, [](const MapError& error) {
     return error.kind == MapErrorKind::moved || error.kind == MapErrorKind::inconsistent;
   });
@@ -190,16 +182,16 @@ std::string format_height_m(double z_m) {
   return text == "-0.000" ? "0.000" : text;
 }
 
-Calibration extract_camera_only_calibration(const Calibration& calibration) {
+Calibration extract_camera(const Calibration& calibration) {
   Calibration alone;
   alone.camera = calibration.camera;
   return alone;
 }
 
-MapErrors check_lamp_map_with_captures(const LampCaptures& input, const Calibration& calibration,
-                                       StepResult& result) {
-  MapErrors found = find_lamp_map_errors(input, calibration, MapErrorOptions().min_offset_px);
-  if (found.is_lamp_map_unusable()) {
+MapErrors check_lamp_map(const LampCaptures& input, const Calibration& calibration,
+                         StepResult& result) {
+  MapErrors found = detect_errors_in_map(input, calibration, MapErrorOptions().min_offset_px);
+  if (found.is_map_unusable()) {
     result.set_step_failure(StepFailure::wrong_map, describe_map_errors(found.errors),
                             input.lamps_file);
     return found;
@@ -210,9 +202,9 @@ MapErrors check_lamp_map_with_captures(const LampCaptures& input, const Calibrat
   return found;
 }
 
-void explain_failure_by_lamp_map_errors(const LampCaptures& input, const Calibration& calibration,
-                                        StepResult& result) {
-  const MapErrors found = find_lamp_map_errors(input, calibration, kMinBlame_px);
+void explain_by_map_errors(const LampCaptures& input, const Calibration& calibration,
+                           StepResult& result) {
+  const MapErrors found = detect_errors_in_map(input, calibration, kMinBlame_px);
   const bool has_lamps = std::any_of(found.errors.begin(), found.errors.end(),
                                      [](const MapError& error) { return !error.lamps.empty(); });
   if (found.errors.empty() || (!has_lamps && result.failure == StepFailure::wrong_map)) return;
@@ -222,29 +214,28 @@ void explain_failure_by_lamp_map_errors(const LampCaptures& input, const Calibra
   for (const MapError& error : found.errors) std::erase(result.warnings, describe_map_error(error));
 }
 
-RotationResult run_rotation_calibration_step(const LampCaptures& input, RotationMethod method,
-                                             HistoryEntry entry) {
+RotationResult run_rotation_step(const LampCaptures& input, RotationMethod method,
+                                 HistoryEntry entry) {
   RotationResult result;
-  check_lamp_map_with_captures(input, extract_camera_only_calibration(input.calibration), result);
+  check_lamp_map(input, extract_camera(input.calibration), result);
   if (!result.has_succeeded()) return result;
   const Camera& camera = input.calibration.camera;
-  result.rotation = find_in_place_rotation_captures(input.frames, input.lamps, camera);
+  result.rotation = detect_pivots(input.frames, input.lamps, camera);
   for (const auto& [image, reason] : result.rotation.rejected_captures) {
     result.warnings.push_back(fmt::format("{}: rejected: {}", image, reason));
   }
   if (result.rotation.status != RotationStatus::ok) {
     const bool map = result.rotation.status == RotationStatus::other_map;
     result.set_step_failure(map ? StepFailure::wrong_map : StepFailure::undetermined,
-                            std::string(describe_rotation_status(result.rotation.status)),
+                            std::string(describe_status(result.rotation.status)),
                             map ? input.lamps_file : std::filesystem::path());
     if (map || result.rotation.status == RotationStatus::axis_moved) {
-      explain_failure_by_lamp_map_errors(input, extract_camera_only_calibration(input.calibration),
-                                         result);
+      explain_by_map_errors(input, extract_camera(input.calibration), result);
     }
     return result;
   }
   const RotationFit axis = fit_rotation_axis(result.rotation, camera);
-  result.circles = fit_and_average_lamp_circle_centers(result.rotation, camera, axis);
+  result.circles = fit_circle_centers(result.rotation, camera, axis);
   result.fit = method == RotationMethod::axis ? axis : result.circles.mean;
   if (!result.fit.converged) {
     const bool is_noise = method == RotationMethod::circle && result.circles.undetermined > 0;
@@ -254,44 +245,41 @@ RotationResult run_rotation_calibration_step(const LampCaptures& input, Rotation
                    "other yaws, preferably twelve over a full turn, or use --method axis"
                  : "no rotation center fits the captures: take them at one position per height, "
                    "over more of the turn, with more visible lamps, and check lens and lamp map");
-    explain_failure_by_lamp_map_errors(input, extract_camera_only_calibration(input.calibration),
-                                       result);
+    explain_by_map_errors(input, extract_camera(input.calibration), result);
     return result;
   }
   auto covariance = compute_joint_covariance(result, input, method);
   add_metrics(result, camera.focal_px());
   add_warnings(result);
-  result.calibration = add_rotation_center_to_calibration(input.calibration, result.fit.center,
-                                                          std::move(covariance), std::move(entry));
+  result.calibration = add_rotation_center(input.calibration, result.fit.center,
+                                           std::move(covariance), std::move(entry));
   const std::string title = fmt::format("{}, method {}", camera.id, rotation_method_name(method));
   result.drawing = [title, rotation = result.rotation, circles = result.circles, fit = result.fit,
                     camera] {
-    return make_rotation_plot_drawing(
-        collect_rotation_plot_data(title, rotation, circles, fit, camera));
+    return draw_rotation(make_rotation_plot(title, rotation, circles, fit, camera));
   };
   return result;
 }
 
-TiltResult run_tilt_calibration_step(const LampCaptures& input, bool refine_map,
-                                     HistoryEntry entry) {
+TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntry entry) {
   TiltResult result;
-  const Calibration alone = extract_camera_only_calibration(input.calibration);
-  check_lamp_map_with_captures(input, alone, result);
+  const Calibration alone = extract_camera(input.calibration);
+  check_lamp_map(input, alone, result);
   if (!result.has_succeeded()) return result;
   TiltCalibrationOptions options;
   options.refine_map = refine_map;
   options.motions = input.motions;
-  if (std::any_of(input.motions.begin(), input.motions.end(), may_camera_move_during_readout)) {
-    check_row_time_and_readout_known(input.calibration.camera);
+  if (std::any_of(input.motions.begin(), input.motions.end(), may_move)) {
+    check_timing_known(input.calibration.camera);
   }
   const auto leveled = [&](const Camera& camera) {
-    return estimate_camera_tilt_from_lamps(input.frames, input.lamps, camera, options);
+    return estimate_tilt_from_lamps(input.frames, input.lamps, camera, options);
   };
   TiltCalibration& leveling = result.tilt;
   leveling = leveled(input.calibration.camera);
   if (!leveling.undetermined.empty()) {
     result.set_step_failure(StepFailure::undetermined, leveling.undetermined);
-    explain_failure_by_lamp_map_errors(input, alone, result);
+    explain_by_map_errors(input, alone, result);
     return result;
   }
   if (leveling.captures_rejected > leveling.captures) {
@@ -306,8 +294,7 @@ TiltResult run_tilt_calibration_step(const LampCaptures& input, bool refine_map,
   };
   auto covariance =
       compute_joint_covariance(leveling.center, leveling.covariance, input, center_for, result);
-  result.metrics = {
-      {"tilt_deg", deg_from_rad(compute_tilt_from_rotation_center(leveling.center).angle_rad)}};
+  result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(leveling.center).angle_rad)}};
   constexpr double max_noise_scale = 3;
   if (leveling.noise_scale > max_noise_scale) {
     // [ROTATION-1] `--refine-map may help`
@@ -316,8 +303,8 @@ TiltResult run_tilt_calibration_step(const LampCaptures& input, bool refine_map,
                     "is slightly wrong, and the error of the tilt may exceed its sd{}",
                     leveling.noise_scale, refine_map ? "" : "; --refine-map may help"));
   }
-  result.calibration = add_rotation_center_to_calibration(input.calibration, leveling.center,
-                                                          std::move(covariance), std::move(entry));
+  result.calibration = add_rotation_center(input.calibration, leveling.center,
+                                           std::move(covariance), std::move(entry));
   return result;
 }
 

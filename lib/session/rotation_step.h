@@ -17,24 +17,24 @@ namespace vlp {
 
 /// Returns a calibration with the camera of `calibration` only, without rotation center and
 /// dispersion.
-Calibration extract_camera_only_calibration(const Calibration& calibration);
+Calibration extract_camera(const Calibration& calibration);
 
 /// Checks the lamp map with the captures of a stationary camera or, if these show no error, with
 /// all captures (calibration/map/map_errors.h). Adds a warning to `result` for each error that
 /// names lamps. If the map is unusable, sets the failure of `result` to wrong_map.
 /// @return all errors found, and the offsets of all lamps
-MapErrors check_lamp_map_with_captures(const LampCaptures& input, const Calibration& calibration,
-                                       StepResult& result);
+MapErrors check_lamp_map(const LampCaptures& input, const Calibration& calibration,
+                         StepResult& result);
 
 /// Replaces the failure of a step by wrong_map if the lamp map has errors, and its message by a
 /// description of them.
-void explain_failure_by_lamp_map_errors(const LampCaptures& input, const Calibration& calibration,
-                                        StepResult& result);
+void explain_by_map_errors(const LampCaptures& input, const Calibration& calibration,
+                           StepResult& result);
 
 /// Estimator of the rotation center.
 enum class RotationMethod {
   axis,   // fit_rotation_axis()
-  circle  // fit_and_average_lamp_circle_centers()
+  circle  // fit_circle_centers()
 };
 
 /// Names of the estimators on the command line and in plots.
@@ -44,7 +44,7 @@ inline constexpr std::array<std::pair<std::string_view, RotationMethod>, 2> kRot
 /// Formats a height in meters, without a sign if it rounds to zero.
 std::string format_height_m(double z_m);
 
-/// Result of run_rotation_calibration_step().
+/// Result of run_rotation_step().
 struct RotationResult : StepResult {
   RotationCaptures rotation;
   RotationFit fit;
@@ -54,10 +54,10 @@ struct RotationResult : StepResult {
 /// Estimates rotation center and tilt from captures of a rotation in place. Metrics: rotation_px,
 /// tilt_deg, and if available rotation_spread_px, rotation_sd_px, lever_arm_mm. Failures:
 /// wrong_map, undetermined.
-RotationResult run_rotation_calibration_step(const LampCaptures& input, RotationMethod method,
-                                             HistoryEntry entry);
+RotationResult run_rotation_step(const LampCaptures& input, RotationMethod method,
+                                 HistoryEntry entry);
 
-/// Result of run_tilt_calibration_step().
+/// Result of run_tilt_step().
 struct TiltResult : StepResult {
   TiltCalibration tilt;
 };
@@ -65,7 +65,6 @@ struct TiltResult : StepResult {
 /// Estimates the tilt from captures taken anywhere (calibration/tilt/), and the lamp map if
 /// `refine_map` is set. Metrics: tilt_deg. Failures: wrong_map, undetermined. Throws
 /// std::invalid_argument if the camera moves and its calibration lacks row_time_s or readout.
-TiltResult run_tilt_calibration_step(const LampCaptures& input, bool refine_map,
-                                     HistoryEntry entry);
+TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntry entry);
 
 }  // namespace vlp

@@ -30,7 +30,7 @@ struct PeriodsOfImages {
   PeriodsOfImages(std::span<const std::span<const Observation>> folders,
                   const std::vector<std::vector<Frame>>& labels) {
     for (std::size_t i = 0; i < folders.size(); ++i) {
-      for (LightPeriod light : collect_light_periods(folders[i], labels[i])) {
+      for (LightPeriod light : collect_periods(folders[i], labels[i])) {
         light.image += sizes_px.size();
         lights.push_back(std::move(light));
       }
@@ -75,7 +75,7 @@ std::vector<MeasuredPeriod> collect_lamp_periods(const std::vector<Observation>&
   return periods;
 }
 
-double compute_row_time_error_fraction(const RowTime& measured, double given_s) {
+double compute_error_fraction(const RowTime& measured, double given_s) {
   constexpr double max_sds = 3;
   return std::max(0.0, std::abs(std::log(measured.row_time_s / given_s)) -
                            max_sds * measured.sd_s / measured.row_time_s);
@@ -83,7 +83,7 @@ double compute_row_time_error_fraction(const RowTime& measured, double given_s) 
 
 }  // namespace
 
-std::vector<std::span<const Observation>> DetectedLights::observations_by_folder() const {
+std::vector<std::span<const Observation>> DetectedLights::by_folder() const {
   std::vector<std::span<const Observation>> folders;
   std::span<const Observation> remaining = observations.images;
   for (const std::size_t size : folder_sizes) {
@@ -93,23 +93,20 @@ std::vector<std::span<const Observation>> DetectedLights::observations_by_folder
   return folders;
 }
 
-RowTimeResult select_row_time_by_periods_and_positions(
-    std::span<const std::span<const Observation>> folders,
-    const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
-    const std::optional<Lens>& lens) {
+RowTimeResult estimate_row_time(std::span<const std::span<const Observation>> folders,
+                                const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
+                                const std::optional<Lens>& lens) {
   const PeriodsOfImages periods(folders, labels);
-  const RowTimeCandidates found = estimate_row_time_candidates(
+  const RowTimeCandidates found = list_row_time_candidates(
       std::vector<MeasuredPeriod>(periods.lights.begin(), periods.lights.end()), lamps);
-  if (found.candidates.size() < 2) return select_row_time_candidate(found);
+  if (found.candidates.size() < 2) return select_row_time(found);
   const auto images = periods.group_lights(found.groups);
-  return select_row_time_candidate(
-      found, compute_position_costs_of_row_time_candidates(found, images, lamps, lens));
+  return select_row_time(found, compute_position_costs(found, images, lamps, lens));
 }
 
-DetectedLights detect_lights_in_folders(const std::vector<fs::path>& folders, const LampMap& lamps,
-                                        const std::optional<Calibration>& calibration,
-                                        bool with_row_time, const FrontendOptions& options,
-                                        const IntakeProgress& progress) {
+DetectedLights detect_in_folders(const std::vector<fs::path>& folders, const LampMap& lamps,
+                                 const std::optional<Calibration>& calibration, bool with_row_time,
+                                 const FrontendOptions& options, const IntakeProgress& progress) {
   DetectedLights lights;
   std::optional<std::array<int, 2>> imager_px;
   std::optional<Readout> readout = options.readout;
@@ -127,17 +124,17 @@ DetectedLights detect_lights_in_folders(const std::vector<fs::path>& folders, co
     images.insert(images.end(), in_folder.begin(), in_folder.end());
   }
   Observations remarks;
-  lights.camera.readout = estimate_readout_direction(images, readout, options, imager_px, remarks);
+  lights.camera.readout = estimate_readout(images, readout, options, imager_px, remarks);
   const LampIntake intake(LightDetector(lamps, lights.camera), ImageUse::fixes, options, imager_px);
-  lights.observations = intake.detect_lamps_in_all_images(images, progress);
-  prepend_observation_messages(remarks, lights.observations);
-  check_any_image_readable(folders.front(), lights.observations.images);
+  lights.observations = intake.detect_in_all(images, progress);
+  prepend_messages(remarks, lights.observations);
+  check_any_readable(folders.front(), lights.observations.images);
   return lights;
 }
 
-std::string describe_row_time_contradiction(const RowTime& measured, const GivenRowTime& given) {
+std::string describe_wrong_row_time(const RowTime& measured, const GivenRowTime& given) {
   if (measured.lamps < kMinRowTimeLamps ||
-      compute_row_time_error_fraction(measured, given.row_time_s) <= kLampDrift) {
+      compute_error_fraction(measured, given.row_time_s) <= kLampDrift) {
     return "";
   }
   // [LAMP-13] `row time is ... us in` | contradicts the frequencies of the map | use the measured
@@ -149,33 +146,30 @@ std::string describe_row_time_contradiction(const RowTime& measured, const Given
       kMicrosecondsPerSecond * measured.row_time_s, kMicrosecondsPerSecond * measured.sd_s);
 }
 
-RowTimeCheck check_row_time_against_lamps(const std::vector<Observation>& images,
-                                          const LampMap& lamps, const GivenRowTime& given) {
-  const auto found = estimate_row_time_candidates(collect_lamp_periods(images), lamps);
+RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                            const GivenRowTime& given) {
+  const auto found = list_row_time_candidates(collect_lamp_periods(images), lamps);
   if (found.candidates.empty()) return {};
   const RowTime& measured = found.candidates.front().row_time;
   if (measured.lamps < kMinRowTimeLamps) return {};
-  return {measured, describe_row_time_contradiction(measured, given),
-          compute_row_time_error_fraction(measured, given.row_time_s)};
+  return {measured, describe_wrong_row_time(measured, given),
+          compute_error_fraction(measured, given.row_time_s)};
 }
 
-std::string describe_alternative_row_time(const std::vector<Observation>& images,
-                                          const LampMap& lamps, const std::optional<Lens>& lens,
-                                          const GivenRowTime& given) {
-  const auto found =
-      select_row_time_by_periods_and_positions(std::array{std::span(images)}, {{}}, lamps, lens)
-          .row_time;
-  return found ? describe_row_time_contradiction(*found, given) : "";
+std::string describe_other_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                                    const std::optional<Lens>& lens, const GivenRowTime& given) {
+  const auto found = estimate_row_time(std::array{std::span(images)}, {{}}, lamps, lens).row_time;
+  return found ? describe_wrong_row_time(*found, given) : "";
 }
 
-void add_row_time_contradiction_to_result(const std::vector<Observation>& images,
-                                          const LampMap& lamps, const DetectorCamera& camera,
-                                          const std::string& source, StepResult& result) {
+void add_row_time_remark(const std::vector<Observation>& images, const LampMap& lamps,
+                         const DetectorCamera& camera, const std::string& source,
+                         StepResult& result) {
   if (!camera.row_time_s) return;
   const GivenRowTime given{*camera.row_time_s, source};
   std::string error;
-  if (result.has_succeeded()) error = check_row_time_against_lamps(images, lamps, given).error;
-  if (error.empty()) error = describe_alternative_row_time(images, lamps, camera.lens, given);
+  if (result.has_succeeded()) error = check_row_time(images, lamps, given).error;
+  if (error.empty()) error = describe_other_row_time(images, lamps, camera.lens, given);
   if (error.empty()) return;
   if (result.has_succeeded()) {
     result.warnings.push_back(std::move(error));
@@ -193,15 +187,15 @@ std::vector<Metric> make_row_time_metrics(const RowTimeCheck& check) {
   return metrics;
 }
 
-RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,
-                                                const std::vector<std::vector<Frame>>& labels,
-                                                const LampMap& lamps, const fs::path& lamps_file,
-                                                const std::optional<Calibration>& calibration,
-                                                HistoryEntry entry) {
-  check_map_has_lamp_frequencies(lamps, lamps_file);
+RowTimeStepResult run_row_time_step(const DetectedLights& seen,
+                                    const std::vector<std::vector<Frame>>& labels,
+                                    const LampMap& lamps, const fs::path& lamps_file,
+                                    const std::optional<Calibration>& calibration,
+                                    HistoryEntry entry) {
+  check_frequencies(lamps, lamps_file);
   RowTimeStepResult result;
-  const RowTimeResult estimate = select_row_time_by_periods_and_positions(
-      seen.observations_by_folder(), labels, lamps, seen.camera.lens);
+  const RowTimeResult estimate =
+      estimate_row_time(seen.by_folder(), labels, lamps, seen.camera.lens);
   if (!estimate.row_time) {
     result.set_step_failure(StepFailure::undetermined, estimate.problem);
     return result;
@@ -210,8 +204,7 @@ RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,
   result.metrics = make_row_time_metrics({result.row_time});
   if (!calibration) return result;
   if (const auto& stated_s = calibration->camera.row_time_s) {
-    std::string error =
-        describe_row_time_contradiction(result.row_time, {*stated_s, "the calibration"});
+    std::string error = describe_wrong_row_time(result.row_time, {*stated_s, "the calibration"});
     if (!error.empty()) result.warnings.push_back(std::move(error));
   }
   result.calibration = *calibration;

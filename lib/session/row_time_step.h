@@ -30,45 +30,43 @@ struct DetectedLights {
   DetectorCamera camera;
 
   /// Returns the observations of each folder.
-  std::vector<std::span<const Observation>> observations_by_folder() const;
+  std::vector<std::span<const Observation>> by_folder() const;
 };
 
 /// Detects the lights in the images of each folder without identifying lamps. `calibration`
 /// supplies the lens and the readout direction if it has them. If `with_row_time` is false, its row
 /// time is ignored. Throws InputError if no image can be read.
-DetectedLights detect_lights_in_folders(const std::vector<std::filesystem::path>& folders,
-                                        const LampMap& lamps,
-                                        const std::optional<Calibration>& calibration,
-                                        bool with_row_time, const FrontendOptions& options,
-                                        const IntakeProgress& progress = {});
+DetectedLights detect_in_folders(const std::vector<std::filesystem::path>& folders,
+                                 const LampMap& lamps,
+                                 const std::optional<Calibration>& calibration, bool with_row_time,
+                                 const FrontendOptions& options,
+                                 const IntakeProgress& progress = {});
 
 /// Chooses a row time by periods and duty cycles of the lights in the images of each folder. Also
-/// uses their positions if several row times fit (compute_position_costs_of_row_time_candidates()).
+/// uses their positions if several row times fit (compute_position_costs()).
 ///
 /// @param labels  for each folder its lights that are lamps; an empty list: all lights of the
 /// folder
-RowTimeResult select_row_time_by_periods_and_positions(
-    std::span<const std::span<const Observation>> folders,
-    const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
-    const std::optional<Lens>& lens);
+RowTimeResult estimate_row_time(std::span<const std::span<const Observation>> folders,
+                                const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
+                                const std::optional<Lens>& lens);
 
-/// Result of estimate_row_time_from_lights().
+/// Result of run_row_time_step().
 struct RowTimeStepResult : StepResult {
   RowTime row_time{};
 };
 
-/// Estimates the row time from lamps with a frequency in the map (estimate_row_time_candidates()).
+/// Estimates the row time from lamps with a frequency in the map (list_row_time_candidates()).
 /// If several row times explain their periods, chooses by their positions
-/// (compute_position_costs_of_row_time_candidates()). Adds row time and readout direction to the
+/// (compute_position_costs()). Adds row time and readout direction to the
 /// camera of `calibration`, if given, and warns if it states another row time
-/// (describe_row_time_contradiction()). Failure: undetermined. Throws InputError if no lamp has a
+/// (describe_wrong_row_time()). Failure: undetermined. Throws InputError if no lamp has a
 /// frequency.
-RowTimeStepResult estimate_row_time_from_lights(const DetectedLights& seen,
-                                                const std::vector<std::vector<Frame>>& labels,
-                                                const LampMap& lamps,
-                                                const std::filesystem::path& lamps_file,
-                                                const std::optional<Calibration>& calibration,
-                                                HistoryEntry entry);
+RowTimeStepResult run_row_time_step(const DetectedLights& seen,
+                                    const std::vector<std::vector<Frame>>& labels,
+                                    const LampMap& lamps, const std::filesystem::path& lamps_file,
+                                    const std::optional<Calibration>& calibration,
+                                    HistoryEntry entry);
 
 /// Row time given by a file or an option.
 struct GivenRowTime {
@@ -87,14 +85,14 @@ struct RowTimeCheck {
   std::optional<double> error_fraction = {};
 };
 
-/// Compares a measured row time with the stated one, as check_row_time_against_lamps() does.
+/// Compares a measured row time with the stated one, as check_row_time() does.
 ///
 /// @return  the contradiction in one line; empty if there is none or fewer than three lamps were
 ///          measured
-std::string describe_row_time_contradiction(const RowTime& measured, const GivenRowTime& given);
+std::string describe_wrong_row_time(const RowTime& measured, const GivenRowTime& given);
 
 /// Estimates the row time from the identified lamps of the kept images
-/// (estimate_row_time_candidates()) and compares it with the given one. They contradict each other
+/// (list_row_time_candidates()) and compares it with the given one. They contradict each other
 /// if
 ///
 ///     |log(measured / stated)| > kLampDrift + 3 sd / measured.
@@ -102,29 +100,28 @@ std::string describe_row_time_contradiction(const RowTime& measured, const Given
 /// A lamp may deviate from its frequency by kLampDrift (frequency_identification.h). The mean of
 /// several lamps then deviates by at most kLampDrift, whether their deviations are independent or
 /// common. The second term covers the measurement, and lamps that deviate by more.
-RowTimeCheck check_row_time_against_lamps(const std::vector<Observation>& images,
-                                          const LampMap& lamps, const GivenRowTime& given);
+RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                            const GivenRowTime& given);
 
 /// Finds another row time that makes the lights of the images lamps of the map, by their periods
-/// and positions, independently of their identification (select_row_time_candidate()): a wrong row
+/// and positions, independently of their identification (select_row_time()): a wrong row
 /// time leaves lights unknown or exchanges lamps.
 ///
 /// @return  the contradiction in one line; empty unless at least three lamps contradict the given
-///          row time as in check_row_time_against_lamps()
-std::string describe_alternative_row_time(const std::vector<Observation>& images,
-                                          const LampMap& lamps, const std::optional<Lens>& lens,
-                                          const GivenRowTime& given);
+///          row time as in check_row_time()
+std::string describe_other_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                                    const std::optional<Lens>& lens, const GivenRowTime& given);
 
 /// Adds a contradiction of the row time of `camera` to the result of a step: in place of the reason
 /// if the step failed, as a warning otherwise, because fixes at rest are valid. The contradiction
-/// is that of check_row_time_against_lamps() if there is a result. Otherwise, and if identified
+/// is that of check_row_time() if there is a result. Otherwise, and if identified
 /// lamps agree because each was taken for its neighbor, it is that of
-/// describe_alternative_row_time(). An unknown row time adds nothing.
+/// describe_other_row_time(). An unknown row time adds nothing.
 ///
 /// @param source  name of the file or of the option that gives the row time
-void add_row_time_contradiction_to_result(const std::vector<Observation>& images,
-                                          const LampMap& lamps, const DetectorCamera& camera,
-                                          const std::string& source, StepResult& result);
+void add_row_time_remark(const std::vector<Observation>& images, const LampMap& lamps,
+                         const DetectorCamera& camera, const std::string& source,
+                         StepResult& result);
 
 /// Returns the metrics row_time_us, row_time_sd_us and, if it was compared, row_time_error_percent;
 /// none if the row time was not measured.

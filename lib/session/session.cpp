@@ -73,10 +73,10 @@ constexpr std::array kPlots{"lens.svg", "rotation.svg", "dispersion.svg"};
 /// Returns the gates of the session: those of the lens, if it is estimated, and those of its file.
 std::vector<Gate> read_session_gates(const SessionFolder& session, const SessionOptions& options) {
   std::vector<Gate> gates;
-  if (!session.camera_calibration_file()) gates = make_default_lens_gates();
+  if (!session.camera_calibration_path()) gates = make_lens_gates();
   const fs::path file = session.gates_file().value_or(options.gates_file);
   if (!file.empty())
-    gates = merge_gates(std::move(gates), read_gates(file, list_session_metric_kinds()));
+    gates = merge_gates(std::move(gates), read_gates(file, list_session_metrics()));
   return options.strict ? merge_gates(std::move(gates), {{"warnings", 0}}) : gates;
 }
 
@@ -89,8 +89,8 @@ struct Work {
 /// Writes the summaries, session.json last: without it the results are those of a killed run.
 void write_summaries(const SessionResults& results, const SessionResult& result,
                      const SessionOptions& options) {
-  write_file(results.results_file_path("junit.xml"), format_session_junit_xml(result));
-  write_file(results.results_file_path("session.json"), format_session_json(result, options));
+  write_file(results.results_file_path("junit.xml"), format_session_junit(result));
+  write_file(results.results_file_path("session.json"), format_session(result, options));
 }
 
 class SessionRun {
@@ -107,8 +107,8 @@ class SessionRun {
   SessionResult run() {
     check_redo_option();
     results_.set_steps(list_outputs());
-    if (run_calibration_steps() && locate_check_and_drives()) {
-      add_gates_of_missing_dispersion();
+    if (run_steps() && locate_drives()) {
+      add_dispersion_gates();
       evaluate_session_fixes();
     }
     finish_session();
@@ -137,13 +137,11 @@ class SessionRun {
     return output_file_path(captures.filename().string() + "-fixes.csv");
   }
   fs::path lamps_file() const { return session_.lamp_map_file(); }
-  LampMap read_lamps() const {
-    return read_overhead_lamps_of_room(lamps_file(), options_.frontend.room);
-  }
+  LampMap read_lamps() const { return read_overhead_lamps(lamps_file(), options_.frontend.room); }
 
   std::string remove_folder(std::string text) const {
-    for (const fs::path& folder : {session_.session_folder_path(), results_.new_outputs_folder(),
-                                   results_.results_folder_path()}) {
+    for (const fs::path& folder :
+         {session_.path(), results_.new_outputs_folder(), results_.path()}) {
       text = vlp::remove_folder(std::move(text), folder);
     }
     return text;
@@ -160,9 +158,9 @@ class SessionRun {
       return names;
     };
     std::vector<std::string> lens;
-    if (!session_.camera_calibration_file()) lens = with_picture({"lens.yaml"}, "lens.svg");
-    if (!session_.camera_calibration_file() &&
-        (options_.choose_lens_model || is_lens_model_supported_by_mrcal(options_.lens_model))) {
+    if (!session_.camera_calibration_path()) lens = with_picture({"lens.yaml"}, "lens.svg");
+    if (!session_.camera_calibration_path() &&
+        (options_.choose_lens_model || can_mrcal_solve(options_.lens_model))) {
       lens.insert(lens.begin() + 1, "lens.cameramodel");
     }
     std::vector<StepOutputs> steps{
@@ -170,7 +168,7 @@ class SessionRun {
         {"row-time", {"camera.yaml"}},
         {"rotation", with_picture({"rotated.yaml"}, "rotation.svg")},
         {"dispersion", with_picture({"calibration.yaml"}, "dispersion.svg")}};
-    if (session_.accuracy_check_captures_folder()) steps.push_back({"check", {"check-fixes.csv"}});
+    if (session_.accuracy_check_folder()) steps.push_back({"check", {"check-fixes.csv"}});
     for (const fs::path& line : line_drive_folders()) {
       steps.push_back({line.filename().string(), {fixes_file_path(line).filename().string()}});
     }
@@ -184,14 +182,13 @@ class SessionRun {
       if (input.empty()) continue;
       text += input.filename().string() + " ";
       try {
-        text += fs::is_directory(input) ? digests_.compute_folder_digest(input)
-                                        : compute_file_sha256(input);
+        text += fs::is_directory(input) ? digests_.digest_folder(input) : hash_file(input);
       } catch (const InputError&) {
         text += "cannot be read";
       }
       text += "\n";
     }
-    return compute_text_sha256(text);
+    return hash_text(text);
   }
 
   /// Runs a step unless inputs, options, program and outputs are unchanged since it last ended.
@@ -201,12 +198,12 @@ class SessionRun {
     if (observer_.on_step_started) observer_.on_step_started(name);
     const std::string key = compute_step_key(inputs, options);
     SessionStep done{name, false, {}};
-    if (auto cached_result = results_.find_cached_step_result(name, key);
+    if (auto cached_result = results_.find_cached(name, key);
         cached_result && !is_redo_requested(name)) {
       done.is_up_to_date = true;
       done.result = std::move(*cached_result);
     } else {
-      results_.remove_outputs_of_step(name);
+      results_.remove_outputs(name);
       done.result = run_step_work(work);
       results_.store_step_result(name, key, done.result);
     }
@@ -226,9 +223,9 @@ class SessionRun {
 
   /// Adds the gates of the dispersion if the session has no captures for it: they fail, because
   /// their metrics have no value.
-  void add_gates_of_missing_dispersion() {
+  void add_dispersion_gates() {
     if (has_step("dispersion")) return;
-    const auto gates = check_gates(find_step_gates("dispersion"), {});
+    const auto gates = check_gates(select_step_gates("dispersion"), {});
     result_.gates.insert(result_.gates.end(), gates.begin(), gates.end());
   }
 
@@ -242,12 +239,11 @@ class SessionRun {
 
   std::vector<CheckedMetric> check_step_gates(const std::string& step,
                                               const std::vector<Metric>& metrics) const {
-    return check_gates(merge_gates(make_default_step_gates(metrics), find_step_gates(step)),
-                       metrics);
+    return check_gates(merge_gates(make_step_gates(metrics), select_step_gates(step)), metrics);
   }
 
   /// Returns the gates of the metrics of a step.
-  std::vector<Gate> find_step_gates(const std::string& step) const {
+  std::vector<Gate> select_step_gates(const std::string& step) const {
     std::vector<Gate> gates;
     for (const Gate& gate : gates_) {
       const std::pair gated(find_metric_kind(gate.metric)->source, std::string_view(step));
@@ -262,7 +258,7 @@ class SessionRun {
     Work done;
     try {
       done = work();
-      if (!done.result.has_succeeded()) add_readout_contradiction_to_result(done.result);
+      if (!done.result.has_succeeded()) add_readout_remark(done.result);
     } catch (const InputError& error) {
       done.result.set_step_failure(StepFailure::bad_input, error.what());
     } catch (const std::invalid_argument& error) {
@@ -277,7 +273,7 @@ class SessionRun {
   }
 
   HistoryEntry make_step_history(const std::string& options, const std::vector<fs::path>& inputs) {
-    return vlp::make_calibration_history_entry(options_.program, options, inputs, digests_);
+    return vlp::make_history_entry(options_.program, options, inputs, digests_);
   }
 
   void write_picture(const StepResult& result, const std::string& name) const {
@@ -307,30 +303,29 @@ class SessionRun {
   bool run_lens() {
     const std::string settings = fmt::format("{} {}", format_camera_options(), options_.report);
     return run_or_reuse_step(
-        "lens", {session_.board_images_folder(), session_.board_file()}, settings, [&] {
+        "lens", {session_.boards_folder(), session_.board_file()}, settings, [&] {
           LensInput input;
           input.board = read_board(session_.board_file());
           input.board_file = session_.board_file();
           FrontendOptions options = options_.frontend;
-          options.corner_cache = results_.corner_cache_folder();
-          input.observations =
-              detect_boards_in_images(list_images(session_.board_images_folder()), input.board,
-                                      session_.board_file(), options, observer_.progress);
+          options.corner_cache = results_.cache_folder();
+          input.observations = detect_boards(list_images(session_.boards_folder()), input.board,
+                                             session_.board_file(), options, observer_.progress);
           input.camera.id = options_.camera_id;
           input.camera.lens_model = options_.lens_model;
           input.camera.row_time_s = options_.frontend.row_time_s;
           input.camera.readout = options_.frontend.readout;
           input.choose_lens_model = options_.choose_lens_model;
-          LensResult lens = run_lens_calibration_step(
-              std::move(input),
-              make_step_history(format_camera_options(),
-                                {session_.board_file(), session_.board_images_folder()}));
+          LensResult lens =
+              run_lens_step(std::move(input),
+                            make_step_history(format_camera_options(),
+                                              {session_.board_file(), session_.boards_folder()}));
           if (lens.lens.choice)
-            lens.notes.push_back("lens model: " + describe_lens_model_choice(*lens.lens.choice));
+            lens.notes.push_back("lens model: " + describe_choice(*lens.lens.choice));
           return Work{lens, [this, lens] {
-                        if (is_lens_model_supported_by_mrcal(lens.calibration.camera.lens_model)) {
-                          write_mrcal_cameramodel(output_file_path("lens.cameramodel"),
-                                                  lens.lens.solution, lens.lens.report.region);
+                        if (can_mrcal_solve(lens.calibration.camera.lens_model)) {
+                          write_cameramodel(output_file_path("lens.cameramodel"),
+                                            lens.lens.solution, lens.lens.report.region);
                         }
                         write_picture(lens, "lens.svg");
                         write_calibration(output_file_path("lens.yaml"), lens.calibration);
@@ -340,18 +335,17 @@ class SessionRun {
 
   bool run_row_time(const fs::path& camera_file) {
     return run_or_reuse_step(
-        "row-time", {session_.rotation_captures_folder(), lamps_file(), camera_file}, "", [&] {
+        "row-time", {session_.rotation_folder(), lamps_file(), camera_file}, "", [&] {
           const LampMap lamps = read_lamps();
           const Calibration camera = read_calibration(camera_file);
           FrontendOptions options = options_.frontend;
           options.readout.reset();
-          const DetectedLights seen =
-              detect_lights_in_folders({session_.rotation_captures_folder()}, lamps, camera, false,
-                                       options, observer_.progress);
-          RowTimeStepResult found = vlp::estimate_row_time_from_lights(
+          const DetectedLights seen = detect_in_folders({session_.rotation_folder()}, lamps, camera,
+                                                        false, options, observer_.progress);
+          RowTimeStepResult found = vlp::run_row_time_step(
               seen, {{}}, lamps, lamps_file(), camera,
-              make_step_history("--row-time", {session_.rotation_captures_folder(), lamps_file()}));
-          add_image_intake_remarks(seen.observations, found);
+              make_step_history("--row-time", {session_.rotation_folder(), lamps_file()}));
+          add_intake_remarks(seen.observations, found);
           return Work{found, [this, found] {
                         write_calibration(output_file_path("camera.yaml"), found.calibration);
                       }};
@@ -361,7 +355,7 @@ class SessionRun {
   FrontendOptions make_lamp_options() const {
     FrontendOptions options = options_.frontend;
     options.readout.reset();  // already part of the calibration
-    if (const auto classifier = session_.lamp_classifier_file()) options.classifier = *classifier;
+    if (const auto classifier = session_.classifier_path()) options.classifier = *classifier;
     return options;
   }
 
@@ -369,41 +363,37 @@ class SessionRun {
   /// and the failure if no image can be used.
   StepResult observe_lamp_images(const LampImages& images, ImageUse use, LampCaptures& captures,
                                  std::vector<Observation>& seen) const {
-    Observations observed =
-        detect_lamps_in_images(images, use, make_lamp_options(), observer_.progress);
-    captures.frames = collect_lamp_frames_of_kept_images(observed.images);
+    Observations observed = detect_lamps(images, use, make_lamp_options(), observer_.progress);
+    captures.frames = collect_lamp_frames(observed.images);
     StepResult result;
-    add_image_intake_remarks(observed, result);
+    add_intake_remarks(observed, result);
     seen = std::move(observed.images);
-    add_row_time_contradiction_to_result(captures, seen, result);
+    add_row_time_remark(captures, seen, result);
     const auto& row_time_s = captures.calibration.camera.row_time_s;
     if (use == ImageUse::rotation && is_row_time_given() && row_time_s) {
-      result.metrics = make_row_time_metrics(check_row_time_against_lamps(
-          seen, captures.lamps, {*row_time_s, describe_row_time_source()}));
+      result.metrics = make_row_time_metrics(
+          check_row_time(seen, captures.lamps, {*row_time_s, describe_source()}));
     }
     return result;
   }
 
   /// Adds a contradiction of the row time to the result of a step
-  /// (add_row_time_contradiction_to_result()).
-  void add_row_time_contradiction_to_result(const LampCaptures& captures,
-                                            const std::vector<Observation>& images,
-                                            StepResult& result) const {
-    if (session_.lamp_classifier_file()) return;  // the lamps are not identified by frequency
-    vlp::add_row_time_contradiction_to_result(images, captures.lamps,
-                                              make_detector_camera(captures.calibration),
-                                              describe_row_time_source(), result);
+  /// (add_row_time_remark()).
+  void add_row_time_remark(const LampCaptures& captures, const std::vector<Observation>& images,
+                           StepResult& result) const {
+    if (session_.classifier_path()) return;  // the lamps are not identified by frequency
+    vlp::add_row_time_remark(images, captures.lamps, make_detector_camera(captures.calibration),
+                             describe_source(), result);
   }
 
   /// Replaces the reason of a step with lamps that failed if the images show stripes along another
   /// direction than the readout direction of the camera.
-  void add_readout_contradiction_to_result(StepResult& result) const {
-    if (result_.steps.empty() || session_.lamp_classifier_file()) return;
+  void add_readout_remark(StepResult& result) const {
+    if (result_.steps.empty() || session_.classifier_path()) return;
     const Camera& camera = result_.calibration->camera;
     Observations remarks;
-    const Readout shown =
-        estimate_readout_direction(list_images(session_.rotation_captures_folder()), {},
-                                   make_lamp_options(), camera.imager_px, remarks);
+    const Readout shown = estimate_readout(list_images(session_.rotation_folder()), {},
+                                           make_lamp_options(), camera.imager_px, remarks);
     if (!camera.readout || shown == *camera.readout || !remarks.warnings.empty()) return;
     // [LAMP-12] `stripes along`
     result.set_step_failure(
@@ -411,20 +401,18 @@ class SessionRun {
         fmt::format("the readout is along {} in {}, but the images show stripes along {}; correct "
                     "it",
                     shown == Readout::rows ? "columns" : "rows",
-                    session_.camera_calibration_file() ? "camera.yaml" : "--readout",
+                    session_.camera_calibration_path() ? "camera.yaml" : "--readout",
                     shown == Readout::rows ? "rows" : "columns"));
   }
 
   /// Returns true if camera.yaml or --row-time-s gives the row time and lamps are identified by
   /// frequency.
-  bool is_row_time_given() const {
-    return !session_.lamp_classifier_file() && !has_step("row-time");
-  }
+  bool is_row_time_given() const { return !session_.classifier_path() && !has_step("row-time"); }
 
   /// Returns the name of the file or the option that gives the row time.
-  std::string describe_row_time_source() const {
+  std::string describe_source() const {
     if (has_step("row-time")) return "camera.yaml of the results";
-    return session_.camera_calibration_file() ? "camera.yaml" : "--row-time-s";
+    return session_.camera_calibration_path() ? "camera.yaml" : "--row-time-s";
   }
 
   /// Adds the remarks and metrics of the images to the result of a step.
@@ -436,34 +424,33 @@ class SessionRun {
                            remarks.warnings.end());
   }
 
-  static LampImages make_session_lamp_images(const fs::path& folder, const LampCaptures& captures,
-                                             const fs::path& calibration_file) {
+  static LampImages make_lamp_images(const fs::path& folder, const LampCaptures& captures,
+                                     const fs::path& calibration_file) {
     return {folder, captures.lamps, captures.lamps_file, captures.calibration, calibration_file};
   }
 
   std::vector<fs::path> list_lamp_inputs(const fs::path& folder,
                                          const fs::path& calibration) const {
-    return {folder, lamps_file(), calibration, session_.lamp_classifier_file().value_or("")};
+    return {folder, lamps_file(), calibration, session_.classifier_path().value_or("")};
   }
 
   std::string format_plot_setting() const { return options_.report ? "picture" : ""; }
-  std::string format_lamp_step_settings() const {
-    return format_plot_setting() + " " + describe_row_time_source();
+  std::string format_lamp_settings() const {
+    return format_plot_setting() + " " + describe_source();
   }
 
   bool run_rotation(const fs::path& camera_file) {
-    const auto inputs = list_lamp_inputs(session_.rotation_captures_folder(), camera_file);
-    return run_or_reuse_step("rotation", inputs, format_lamp_step_settings(), [&] {
+    const auto inputs = list_lamp_inputs(session_.rotation_folder(), camera_file);
+    return run_or_reuse_step("rotation", inputs, format_lamp_settings(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(camera_file)};
-      LampImages images =
-          make_session_lamp_images(session_.rotation_captures_folder(), captures, camera_file);
+      LampImages images = make_lamp_images(session_.rotation_folder(), captures, camera_file);
       images.captures.emplace();  // inclinations are ignored: the axis is level
       std::vector<Observation> seen;
       const StepResult remarks = observe_lamp_images(images, ImageUse::rotation, captures, seen);
       if (!remarks.has_succeeded()) return Work{remarks};
-      RotationResult found = run_rotation_calibration_step(captures, RotationMethod::axis,
-                                                           make_step_history("", inputs));
-      if (!found.has_succeeded()) add_row_time_contradiction_to_result(captures, seen, found);
+      RotationResult found =
+          run_rotation_step(captures, RotationMethod::axis, make_step_history("", inputs));
+      if (!found.has_succeeded()) add_row_time_remark(captures, seen, found);
       add_image_remarks(remarks, found);
       return Work{found, [this, found] {
                     write_picture(found, "rotation.svg");
@@ -473,27 +460,26 @@ class SessionRun {
   }
 
   bool run_dispersion() {
-    const fs::path folder = *session_.dispersion_captures_folder(),
+    const fs::path folder = *session_.dispersion_folder(),
                    rotated = output_file_path("rotated.yaml");
     const auto inputs = list_lamp_inputs(folder, rotated);
-    return run_or_reuse_step("dispersion", inputs, format_lamp_step_settings(), [&] {
+    return run_or_reuse_step("dispersion", inputs, format_lamp_settings(), [&] {
       LampCaptures captures{{}, read_lamps(), lamps_file(), read_calibration(rotated)};
       std::vector<Observation> seen;
-      const StepResult remarks =
-          observe_lamp_images(make_session_lamp_images(folder, captures, rotated),
-                              ImageUse::known_positions, captures, seen);
+      const StepResult remarks = observe_lamp_images(make_lamp_images(folder, captures, rotated),
+                                                     ImageUse::known_positions, captures, seen);
       if (!remarks.has_succeeded()) return Work{remarks};
       const KnownPositions places =
-          collect_captures_at_known_positions(captures.frames, read_captures_with_truth(folder));
+          collect_known_captures(captures.frames, read_captures_with_truth(folder));
       if (places.captures.empty()) {
         throw InputError(folder,
                          "its captures have no positions; add x_m and y_m to captures.csv, with "
                          "the names of the images");
       }
-      DispersionResult found = run_dispersion_calibration_step(
-          captures, places, DispersionMethod::camera, DispersionCircle::mean,
-          make_step_history("", add_capture_tables(inputs, folder)));
-      if (!found.has_succeeded()) add_row_time_contradiction_to_result(captures, seen, found);
+      DispersionResult found =
+          run_dispersion_step(captures, places, DispersionMethod::camera, DispersionCircle::mean,
+                              make_step_history("", add_capture_tables(inputs, folder)));
+      if (!found.has_succeeded()) add_row_time_remark(captures, seen, found);
       add_image_remarks(remarks, found);
       if (places.captures_without_position > 0) {
         found.warnings.push_back(
@@ -515,13 +501,13 @@ class SessionRun {
     return inputs;
   }
 
-  bool run_calibration_steps() {
-    const auto given = session_.camera_calibration_file();
+  bool run_steps() {
+    const auto given = session_.camera_calibration_path();
     if (given ? !read_given_camera(*given) : !run_lens()) return false;
     fs::path camera = given ? *given : output_file_path("lens.yaml");
     result_.calibration = read_calibration(camera);
-    if (result_.calibration->camera.row_time_s || session_.lamp_classifier_file()) {
-      results_.remove_outputs_of_step("row-time");
+    if (result_.calibration->camera.row_time_s || session_.classifier_path()) {
+      results_.remove_outputs("row-time");
       if (is_redo_requested("row-time")) {
         throw std::invalid_argument(
             "there is no step row-time in this session, as the row time is known or there is a "
@@ -534,8 +520,8 @@ class SessionRun {
     }
     if (!run_rotation(camera)) return false;
     result_.calibration = read_calibration(output_file_path("rotated.yaml"));
-    if (!session_.dispersion_captures_folder()) {
-      results_.remove_outputs_of_step("dispersion");
+    if (!session_.dispersion_folder()) {
+      results_.remove_outputs("dispersion");
       write_calibration(output_file_path("calibration.yaml"), *result_.calibration);
       return true;
     }
@@ -546,7 +532,7 @@ class SessionRun {
 
   /// Runs the step lens for a given camera.yaml, which fails if the file cannot be read.
   bool read_given_camera(const fs::path& camera) {
-    const std::string unused = list_changed_camera_options();
+    const std::string unused = list_camera_options();
     return run_or_reuse_step("lens", {camera}, unused, [&] {
       const auto report = read_calibration(camera).intrinsics_report;
       Work work;
@@ -560,7 +546,7 @@ class SessionRun {
   }
 
   /// Returns the changed options of the camera, such as "name, row time"; empty if none is changed.
-  std::string list_changed_camera_options() const {
+  std::string list_camera_options() const {
     const SessionOptions unstated;
     std::string stated;
     const auto add = [&](bool is_stated, const char* what) {
@@ -577,9 +563,8 @@ class SessionRun {
     return stated;
   }
 
-  bool locate_check_and_drives() {
-    if (const auto check = session_.accuracy_check_captures_folder();
-        check && !locate_folder(*check))
+  bool locate_drives() {
+    if (const auto check = session_.accuracy_check_folder(); check && !locate_folder(*check))
       return false;
     for (const fs::path& line : line_drive_folders()) {
       if (!locate_folder(line)) return false;
@@ -592,15 +577,15 @@ class SessionRun {
     return run_or_reuse_step(
         folder.filename().string(), list_lamp_inputs(folder, calibration), "", [&] {
           LocateInput input{
-              {}, read_lamps(), read_calibration(calibration), read_captures_csv_of_folder(folder)};
-          input.compute_lamp_offsets = session_.accuracy_check_captures_folder() == folder;
+              {}, read_lamps(), read_calibration(calibration), read_folder_captures(folder)};
+          input.compute_lamp_offsets = session_.accuracy_check_folder() == folder;
           const LampImages images{folder, input.lamps, lamps_file(), input.calibration,
                                   calibration};
-          const ImageUse use = session_.accuracy_check_captures_folder() == folder
+          const ImageUse use = session_.accuracy_check_folder() == folder
                                    ? ImageUse::known_positions
                                    : ImageUse::fixes;
-          LocateResult found = locate_camera_from_images(images, use, std::move(input),
-                                                         make_lamp_options(), observer_.progress);
+          LocateResult found = locate_from_images(images, use, std::move(input),
+                                                  make_lamp_options(), observer_.progress);
           return Work{found, [this, folder, rows = found.rows] {
                         write_fixes(fixes_file_path(folder), rows);
                       }};
@@ -611,7 +596,7 @@ class SessionRun {
     std::optional<fs::path> truth;
     std::vector<fs::path> inputs{output_file_path("check-fixes.csv"), lamps_file(),
                                  output_file_path("calibration.yaml")};
-    if (const auto check = session_.accuracy_check_captures_folder()) {
+    if (const auto check = session_.accuracy_check_folder()) {
       for (const fs::path& table : add_capture_tables({}, *check)) inputs.push_back(table);
     }
     for (const char* plot : kPlots) {
@@ -622,11 +607,11 @@ class SessionRun {
       inputs.push_back(fixes_file_path(line));
       for (const fs::path& table : add_capture_tables({}, line)) inputs.push_back(table);
     }
-    const std::vector<Gate> gates = find_step_gates("evaluate");
+    const std::vector<Gate> gates = select_step_gates("evaluate");
     std::string limits;
     for (const Gate& gate : gates_) limits += fmt::format("{} {}\n", gate.metric, gate.limit);
     run_or_reuse_step("evaluate", inputs, format_plot_setting() + limits, [&] {
-      const auto check = session_.accuracy_check_captures_folder();
+      const auto check = session_.accuracy_check_folder();
       if (check) truth = find_truth_file(*check);
       Work work = truth ? evaluate_check(*truth, inputs, gates) : Work();
       if (!truth) {
@@ -635,7 +620,7 @@ class SessionRun {
                                              "nor positions in captures.csv"
                                            : "no errors and no report: there is no check");
       }
-      if (!session_.dispersion_captures_folder()) {
+      if (!session_.dispersion_folder()) {
         work.result.notes.emplace_back(
             "no dispersion offset: the session has no folder dispersion");
       }
@@ -651,12 +636,12 @@ class SessionRun {
     input->truth = {truth, read_truth_positions(truth.parent_path())};
     input->reference_point_radius_m = compute_same_position_radius_m(*result_.calibration);
     input->threads = options_.frontend.threads;
-    EvaluateResult found = evaluate_fixes_against_truth(*input, gates);
+    EvaluateResult found = evaluate_with_truth(*input, gates);
     std::vector<Drive> drives;
     for (const fs::path& line : line_drive_folders()) {
       const fs::path places = *find_truth_file(line), fixes = fixes_file_path(line);
-      drives.push_back({{fixes, read_fixes(fixes)},
-                        find_end_points_of_drive(places, read_truth_positions(line))});
+      drives.push_back(
+          {{fixes, read_fixes(fixes)}, read_end_points(places, read_truth_positions(line))});
       if (fit_line_to_fixes(drives.back().fixes.rows, drives.back().commanded_m)) continue;
       throw InputError(fixes, "no line can be fitted to its fixes: they have no direction");
     }
@@ -669,14 +654,14 @@ class SessionRun {
       if (row.lamps < min_lamps) continue;
       errors.push_back({row.image, error.horizontal_m.norm(), error.fix});
     }
-    if (std::string outliers = describe_position_error_outliers(errors); !outliers.empty()) {
+    if (std::string outliers = describe_error_outliers(errors); !outliers.empty()) {
       found.warnings.push_back(std::move(outliers));
     }
     add_warnings_metric(found);
     found.gates = check_step_gates("evaluate", found.metrics);
     return {found, [=, this] {
               write_file(output_file_path("evaluation.json"),
-                         format_evaluation_json(found.evaluation, found.gates));
+                         format_evaluation(found.evaluation, found.gates));
               if (!options_.report) return;
               Report page;
               page.gates = result_.gates;
@@ -687,9 +672,8 @@ class SessionRun {
                   page.plots.push_back(read_report_plot(output_file_path(plot)));
               }
               page.evaluation = make_step_history("", inputs);
-              write_file(
-                  output_file_path("report.html"),
-                  render_evaluation_report_html({*input, found, read_lamps(), drives, page}));
+              write_file(output_file_path("report.html"),
+                         render_evaluation_html({*input, found, read_lamps(), drives, page}));
             }};
   }
 
@@ -700,7 +684,7 @@ class SessionRun {
       result_.verdict = Verdict::invalid;
       result_.failure = last.result.failure;
       result_.reason = last.name + ": " + last.result.message;
-      results_.remove_outputs_of_later_steps(last.name);
+      results_.remove_later_outputs(last.name);
     }
     const std::string missed = describe_failed_gates(result_.gates);
     if (!missed.empty() && last.result.has_succeeded()) {
@@ -723,7 +707,7 @@ class SessionRun {
 
 }  // namespace
 
-std::vector<Gate> make_default_step_gates(const std::vector<Metric>& metrics) {
+std::vector<Gate> make_step_gates(const std::vector<Metric>& metrics) {
   constexpr double max_reference_error_mm = 5;
   const auto exceeds_reference_error = [&](const char* error) {
     return find_metric_value(metrics, error).value_or(max_reference_error_mm) >=
@@ -743,17 +727,16 @@ std::vector<Gate> make_default_step_gates(const std::vector<Metric>& metrics) {
   return gates;
 }
 
-std::vector<MetricKind> list_session_metric_kinds() {
+std::vector<MetricKind> list_session_metrics() {
   return list_metric_kinds({MetricSource::lens, MetricSource::rotation, MetricSource::dispersion,
                             MetricSource::evaluation});
 }
 
-SessionResult run_calibration_session(const fs::path& session, const fs::path& results,
-                                      const SessionOptions& options,
-                                      const SessionObserver& observer) {
-  if (!options.gates_file.empty()) read_gates(options.gates_file, list_session_metric_kinds());
+SessionResult run_session(const fs::path& session, const fs::path& results,
+                          const SessionOptions& options, const SessionObserver& observer) {
+  if (!options.gates_file.empty()) read_gates(options.gates_file, list_session_metrics());
   if (!fs::is_directory(session)) throw InputError(session, "is not a folder of captures");
-  if (is_session_or_captures_folder(session, results)) {
+  if (is_session_folder(session, results)) {
     throw InputError(results, "contains captures: choose another folder for the results");
   }
   SessionResults session_results(results, session);
@@ -768,9 +751,9 @@ SessionResult run_calibration_session(const fs::path& session, const fs::path& r
     result.failure = StepFailure::bad_input;
     result.reason = remove_folder(error.what(), session);
     if (folder) {
-      session_results.remove_evaluation_outputs();  // other results remain valid
+      session_results.remove_evaluation();  // other results remain valid
     } else {
-      session_results.remove_outputs_of_all_steps();
+      session_results.remove_all_outputs();
     }
     write_summaries(session_results, result, options);
     return result;

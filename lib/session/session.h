@@ -19,7 +19,7 @@
 namespace vlp {
 
 // clang-format off
-/// Options of run_calibration_session(). The steps of the procedure, in their order; each drive along a line,
+/// Options of run_session(). The steps of the procedure, in their order; each drive along a line,
 /// "line-x", is a separate step between check and evaluate:
 ///
 ///   lens        boards -> lens.yaml, lens.cameramodel, lens.svg      unless there is camera.yaml
@@ -39,9 +39,9 @@ struct SessionOptions {
   bool choose_lens_model = false;
   /// Threads, limits for images, row time and readout direction of the camera.
   FrontendOptions frontend = {};
-  /// File in format vlp-gates/1 with gates of list_session_metric_kinds(), for a session without
-  /// its own gates.yaml; may be empty. Its gates are added to make_default_lens_gates() and to
-  /// make_default_step_gates(), or replace the gates of the same metric.
+  /// File in format vlp-gates/1 with gates of list_session_metrics(), for a session without
+  /// its own gates.yaml; may be empty. Its gates are added to make_lens_gates() and to
+  /// make_step_gates(), or replace the gates of the same metric.
   std::filesystem::path gates_file = {};
   /// Adds the gate `warnings: 0`.
   bool strict = false;
@@ -59,7 +59,7 @@ struct SessionStep {
   StepResult result;
 };
 
-/// Result of run_calibration_session().
+/// Result of run_session().
 struct SessionResult {
   /// `fail` if a gate fails, `invalid` if a step failed.
   Verdict verdict = Verdict::pass;
@@ -84,10 +84,10 @@ struct SessionObserver {
 /// Returns gates that every correct session passes, for the metrics that a step has: they notice a
 /// wrong row time, a rotation or a lens of another camera, and errors that contradict the reported
 /// standard deviations. RMS errors below 5 mm do not, as reference points are measured no better.
-std::vector<Gate> make_default_step_gates(const std::vector<Metric>& metrics);
+std::vector<Gate> make_step_gates(const std::vector<Metric>& metrics);
 
 /// Returns the metrics of the procedure, which its gates can limit.
-std::vector<MetricKind> list_session_metric_kinds();
+std::vector<MetricKind> list_session_metrics();
 
 /// Runs the whole procedure: calibrates a camera from the folder of a session, checks it, and
 /// writes a report. All outputs are written into `results`, which is created if it does not exist.
@@ -102,9 +102,8 @@ std::vector<MetricKind> list_session_metric_kinds();
 /// @throws InputError if `session` is not a folder or the file of gates is invalid; if `results`
 ///     holds captures or the results of another session, is in use by another run, or cannot be
 ///     written
-SessionResult run_calibration_session(const std::filesystem::path& session,
-                                      const std::filesystem::path& results,
-                                      const SessionOptions& options,
-                                      const SessionObserver& observer = {});
+SessionResult run_session(const std::filesystem::path& session,
+                          const std::filesystem::path& results, const SessionOptions& options,
+                          const SessionObserver& observer = {});
 
 }  // namespace vlp

@@ -41,13 +41,12 @@ Json make_calibration_json(const Calibration& calibration) {
   }
   if (const auto& row_time_s = calibration.camera.row_time_s) json["row_time_s"] = *row_time_s;
   if (const auto& center = calibration.rotation_center) {
-    const auto [angle_rad, azimuth_rad] = compute_tilt_from_rotation_center(*center);
+    const auto [angle_rad, azimuth_rad] = compute_tilt(*center);
     json["rotation_center_px"] = {center->center_px.x(), center->center_px.y()};
-    json["rotation_center_sd_px"] =
-        make_sd_json(compute_rotation_center_covariance(calibration), 1);
+    json["rotation_center_sd_px"] = make_sd_json(compute_center_covariance(calibration), 1);
     json["tilt_deg"] = deg_from_rad(angle_rad);
     json["tilt_azimuth_deg"] = deg_from_rad(azimuth_rad);
-    const Eigen::Vector2d zenith = compute_normalized_zenith_point(*center);
+    const Eigen::Vector2d zenith = compute_zenith_point(*center);
     json["zenith_deg"] = {kDegrees * zenith.x(), kDegrees * zenith.y()};
     json["zenith_sd_deg"] =
         make_sd_json(find_parameter_covariance(calibration, kZenithParameter), kDegrees);
@@ -59,8 +58,7 @@ Json make_calibration_json(const Calibration& calibration) {
   }
   if (const auto& dispersion = calibration.dispersion) {
     json["dispersion_offset_px"] = {dispersion->offset_px.x(), dispersion->offset_px.y()};
-    json["dispersion_offset_sd_px"] =
-        make_sd_json(compute_dispersion_offset_covariance(calibration), 1);
+    json["dispersion_offset_sd_px"] = make_sd_json(compute_offset_covariance(calibration), 1);
     json["dispersion_radius_mm"] = kMillimetersPerMeter * dispersion->radius_m;
   }
   return json;
@@ -86,7 +84,7 @@ Json make_history_json(const Calibration& calibration) {
 Json make_metrics_json(const SessionResult& result) {
   Json metrics = Json::array();
   for (const SessionStep& step : result.steps) {
-    const Json of_step = make_step_result_json(step.result);
+    const Json of_step = make_step_json(step.result);
     for (Json metric : of_step.at("metrics")) {
       const auto name = metric.at("name").get<std::string>();
       metric["step"] = step.name;
@@ -121,7 +119,7 @@ Eigen::Vector2d parse_vector(const Json& json) {
 
 StepResult parse_result(const Json& json) {
   StepResult result;
-  const auto failure = step_failure_from_name(json.at("failure").get<std::string>());
+  const auto failure = failure_from_name(json.at("failure").get<std::string>());
   result.set_step_failure(failure.value_or(StepFailure::bad_input),
                           json.at("message").get<std::string>(),
                           json.at("file").get<std::string>());
@@ -154,11 +152,11 @@ Json make_gate_json(const CheckedMetric& gate) {
           {"unit", gate.unit},
           {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
           {"limit", gate.limit ? Json(*gate.limit) : Json(nullptr)},
-          {"direction", describe_limit_direction(gate.direction)},
+          {"direction", describe_direction(gate.direction)},
           {"passed", gate.has_passed_gate()}};
 }
 
-Json make_step_result_json(const StepResult& result) {
+Json make_step_json(const StepResult& result) {
   Json json{{"failure", step_failure_name(result.failure)},
             {"message", result.message},
             {"file", result.file_to_correct.string()},
@@ -190,10 +188,10 @@ Json make_step_result_json(const StepResult& result) {
 
 std::optional<StepRecord> read_step_record(const std::filesystem::path& file) {
   try {
-    const auto text = SharedFolder(file.parent_path())
-                          .read_file_if_exists(file.filename().string(), kMaxStepBytes);
+    const auto text =
+        SharedFolder(file.parent_path()).read_if_exists(file.filename().string(), kMaxStepBytes);
     if (!text) return std::nullopt;
-    check_json_size_and_depth(*text);
+    check_json_limits(*text);
     const Json json = Json::parse(*text, nullptr, false);
     if (!json.is_object()) return std::nullopt;
     if (json.at("format").get<std::string>() != kStepFormat) return std::nullopt;
@@ -208,16 +206,16 @@ void write_step_record(const std::filesystem::path& file, const StepRecord& step
   const Json json{{"format", kStepFormat},
                   {"key", step.key},
                   {"outputs", step.outputs},
-                  {"result", make_step_result_json(step.result)}};
+                  {"result", make_step_json(step.result)}};
   AtomicFileWriter whole(file);
   whole.write(json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n");
   whole.save_without_fsync();  // an incomplete record is ignored, and the step runs again
 }
 
-std::string format_session_json(const SessionResult& result, const SessionOptions& options) {
+std::string format_session(const SessionResult& result, const SessionOptions& options) {
   const bool known = result.calibration.has_value();
   Json json{{"format", "vlp-session/2"},
-            {"verdict", session_verdict_name(result.verdict)},
+            {"verdict", verdict_text(result.verdict)},
             {"reason", result.reason},
             {"failure", step_failure_name(result.failure)},
             {"camera", known ? result.calibration->camera.id : options.camera_id},
@@ -227,7 +225,7 @@ std::string format_session_json(const SessionResult& result, const SessionOption
             {"steps", Json::array()}};
   for (const CheckedMetric& gate : result.gates) json["gates"].push_back(make_gate_json(gate));
   for (const SessionStep& step : result.steps) {
-    const Json of_step = make_step_result_json(step.result);
+    const Json of_step = make_step_json(step.result);
     Json entry{{"name", step.name}, {"failure", of_step.at("failure")}};
     for (const char* key :
          {"message", "warnings", "notes", "skipped", "rejected_lamps", "lamp_offsets"}) {
@@ -242,7 +240,7 @@ std::string format_session_json(const SessionResult& result, const SessionOption
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
-std::string format_session_junit_xml(const SessionResult& result) {
+std::string format_session_junit(const SessionResult& result) {
   std::vector<JUnitTest> tests;
   tests.reserve(result.steps.size() + result.gates.size() + 1);
   for (const SessionStep& step : result.steps) {
@@ -259,7 +257,7 @@ std::string format_session_junit_xml(const SessionResult& result) {
     tests.push_back({"session", JUnitTest::Result::error, result.reason,
                      std::string(step_failure_name(result.failure))});
   }
-  const auto gates = make_junit_tests_from_gates(result.gates);
+  const auto gates = make_gate_tests(result.gates);
   tests.insert(tests.end(), gates.begin(), gates.end());
   return format_junit_xml("vlp-calibrate", tests);
 }

@@ -31,7 +31,7 @@ void write_step_record(const std::filesystem::path& file, const StepRecord& step
 
 /// Returns a result in the form of the record and of session.json. Metrics that are not finite are
 /// null.
-nlohmann::ordered_json make_step_result_json(const StepResult& result);
+nlohmann::ordered_json make_step_json(const StepResult& result);
 /// Returns a checked gate in the form of session.json.
 nlohmann::ordered_json make_gate_json(const CheckedMetric& gate);
 
@@ -48,11 +48,11 @@ nlohmann::ordered_json make_gate_json(const CheckedMetric& gate);
 /// Standard deviations (_sd_) cover the captures of the step alone; that of the zenith includes the
 /// contribution of the lens. The file is written last: without it the results are those of a run
 /// that was killed. The same run gives the same bytes.
-std::string format_session_json(const SessionResult& result, const SessionOptions& options);
+std::string format_session(const SessionResult& result, const SessionOptions& options);
 
 /// Returns the content of `junit.xml` for CI systems: a test for each step with its warnings, then
 /// a test for each gate. A step without a result is an error of type SessionResult::failure, with
 /// its message. A session that cannot be read is an error of a test named "session".
-std::string format_session_junit_xml(const SessionResult& result);
+std::string format_session_junit(const SessionResult& result);
 
 }  // namespace vlp

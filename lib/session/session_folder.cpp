@@ -12,7 +12,7 @@ namespace vlp {
 namespace fs = std::filesystem;
 
 CapturesTable read_captures_with_truth(const fs::path& folder) {
-  CapturesTable captures = read_captures_csv_of_folder(folder);
+  CapturesTable captures = read_folder_captures(folder);
   if (!fs::exists(folder / "truth.csv")) return captures;
   for (const TruthRow& row : read_truth_table(folder / "truth.csv")) {
     Capture& capture = captures[row.image];
@@ -40,7 +40,7 @@ std::optional<fs::path> find_truth_file(const fs::path& folder) {
 std::vector<TruthRow> read_truth_positions(const fs::path& folder) {
   if (fs::exists(folder / "truth.csv")) return read_truth_table(folder / "truth.csv");
   std::vector<TruthRow> rows;
-  for (const auto& [image, capture] : read_captures_csv_of_folder(folder)) {
+  for (const auto& [image, capture] : read_folder_captures(folder)) {
     if (!capture.x_m || !capture.y_m || capture.measured_point == MeasuredPoint::axis) continue;
     rows.push_back({image, {*capture.x_m, *capture.y_m}, capture.z_m, capture.yaw_rad});
   }
@@ -67,11 +67,10 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   };
   need("lamps.yaml");
   need("rotation");
-  if (!camera_calibration_file() && !fs::exists(board_file()) &&
-      !fs::exists(board_images_folder())) {
+  if (!camera_calibration_path() && !fs::exists(board_file()) && !fs::exists(boards_folder())) {
     throw InputError(folder, "has neither boards with board.yaml nor camera.yaml");
   }
-  if (!camera_calibration_file()) {
+  if (!camera_calibration_path()) {
     need("board.yaml");
     need("boards");
   }
@@ -83,11 +82,11 @@ SessionFolder::SessionFolder(const fs::path& folder) : folder_(folder) {
   std::sort(lines_.begin(), lines_.end());
 }
 
-std::optional<fs::path> SessionFolder::find_optional_session_entry(const char* name) const {
+std::optional<fs::path> SessionFolder::find_entry(const char* name) const {
   return fs::exists(folder_ / name) ? std::optional(folder_ / name) : std::nullopt;
 }
 
-bool is_session_or_captures_folder(const fs::path& session, const fs::path& results) {
+bool is_session_folder(const fs::path& session, const fs::path& results) {
   std::error_code missing;
   if (fs::equivalent(results, session, missing)) return true;
   for (const auto& entry : fs::directory_iterator(session)) {
@@ -99,8 +98,8 @@ bool is_session_or_captures_folder(const fs::path& session, const fs::path& resu
   return false;
 }
 
-std::array<Eigen::Vector2d, 2> find_end_points_of_drive(const fs::path& truth,
-                                                        const std::vector<TruthRow>& places) {
+std::array<Eigen::Vector2d, 2> read_end_points(const fs::path& truth,
+                                               const std::vector<TruthRow>& places) {
   const std::array<Eigen::Vector2d, 2> ends_m{places.front().xy_m, places.back().xy_m};
   if (ends_m[0] == ends_m[1]) throw InputError(truth, "start and end of the drive are equal");
   return ends_m;

@@ -55,32 +55,28 @@ class SessionFolder {
   /// Opens the folder of a session. Throws InputError if a required file or folder is missing.
   explicit SessionFolder(const std::filesystem::path& folder);
 
-  const std::filesystem::path& session_folder_path() const { return folder_; }
+  const std::filesystem::path& path() const { return folder_; }
   std::filesystem::path lamp_map_file() const { return folder_ / "lamps.yaml"; }
   std::filesystem::path board_file() const { return folder_ / "board.yaml"; }
-  std::filesystem::path board_images_folder() const { return folder_ / "boards"; }
-  std::filesystem::path rotation_captures_folder() const { return folder_ / "rotation"; }
-  std::optional<std::filesystem::path> camera_calibration_file() const {
-    return find_optional_session_entry("camera.yaml");
+  std::filesystem::path boards_folder() const { return folder_ / "boards"; }
+  std::filesystem::path rotation_folder() const { return folder_ / "rotation"; }
+  std::optional<std::filesystem::path> camera_calibration_path() const {
+    return find_entry("camera.yaml");
   }
-  std::optional<std::filesystem::path> dispersion_captures_folder() const {
-    return find_optional_session_entry("dispersion");
+  std::optional<std::filesystem::path> dispersion_folder() const {
+    return find_entry("dispersion");
   }
-  std::optional<std::filesystem::path> accuracy_check_captures_folder() const {
-    return find_optional_session_entry("check");
+  std::optional<std::filesystem::path> accuracy_check_folder() const { return find_entry("check"); }
+  std::optional<std::filesystem::path> classifier_path() const {
+    return find_entry("classifier.yaml");
   }
-  std::optional<std::filesystem::path> lamp_classifier_file() const {
-    return find_optional_session_entry("classifier.yaml");
-  }
-  std::optional<std::filesystem::path> gates_file() const {
-    return find_optional_session_entry("gates.yaml");
-  }
+  std::optional<std::filesystem::path> gates_file() const { return find_entry("gates.yaml"); }
   /// Folders of the drives along a line with known places, sorted by name. Includes drives whose
   /// table cannot be read: their steps report the error.
   const std::vector<std::filesystem::path>& line_drive_folders() const { return lines_; }
 
  private:
-  std::optional<std::filesystem::path> find_optional_session_entry(const char* name) const;
+  std::optional<std::filesystem::path> find_entry(const char* name) const;
 
   std::filesystem::path folder_;
   std::vector<std::filesystem::path> lines_;
@@ -88,11 +84,10 @@ class SessionFolder {
 
 /// Returns true if `results` is the folder of the session or a folder of captures in it, where
 /// results must not be written.
-bool is_session_or_captures_folder(const std::filesystem::path& session,
-                                   const std::filesystem::path& results);
+bool is_session_folder(const std::filesystem::path& session, const std::filesystem::path& results);
 
 /// Returns the first and the last place of a drive, in m. Throws InputError if they are equal.
-std::array<Eigen::Vector2d, 2> find_end_points_of_drive(const std::filesystem::path& truth,
-                                                        const std::vector<TruthRow>& places);
+std::array<Eigen::Vector2d, 2> read_end_points(const std::filesystem::path& truth,
+                                               const std::vector<TruthRow>& places);
 
 }  // namespace vlp

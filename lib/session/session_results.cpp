@@ -74,17 +74,17 @@ constexpr const char* kOutputs = "outputs";
 constexpr std::string_view kSteps = "steps/", kRecordEnd = ".json", kFixesEnd = "-fixes.csv";
 
 /// Returns the name of a step's record in the folder of results.
-std::string step_record_file_name(const std::string& step) {
+std::string step_file_name(const std::string& step) {
   return std::string(kSteps).append(step).append(kRecordEnd);
 }
 
 /// Returns true for the names of drives, which are folders of a session and steps.
 bool is_drive_name(std::string_view step) {
-  return step.starts_with("line-") && Id::is_valid_name_of_camera_or_run(step);
+  return step.starts_with("line-") && Id::is_valid(step);
 }
 
 SharedFolder make_steps_folder(const fs::path& results) {
-  return SharedFolder(results).open_or_create_subfolder({"steps", results, "step"});
+  return SharedFolder(results).open_or_create({"steps", results, "step"});
 }
 
 int lock_folder(const SharedFolder& steps, const fs::path& results) {
@@ -116,8 +116,8 @@ bool is_output_name(std::string_view name) {
 
 }  // namespace
 
-void write_refusal_junit_xml(const fs::path& results, const fs::path& session,
-                             const std::string& message) try {
+void write_refusal_junit(const fs::path& results, const fs::path& session,
+                         const std::string& message) try {
   const bool is_free = !fs::exists(results) || (fs::is_directory(results) && fs::is_empty(results));
   if (results.empty() || !(is_free || fs::exists(owner_mark_file(results)))) return;
   const SessionResults locked(results, is_free ? session : fs::path());
@@ -137,13 +137,13 @@ SessionResults::SessionResults(fs::path folder, const fs::path& session)
   if (not_made) throw InputError(folder_, "cannot be made: " + not_made.message());
   const SharedFolder steps = make_steps_folder(folder_);
   lock_ = lock_folder(steps, folder_);
-  steps.open_subfolder_if_exists({"corners", folder_, "step"});  // throws if it is a link
-  const auto owner = steps.read_file_if_exists("session", kMaxMarkBytes);
+  steps.open_if_exists({"corners", folder_, "step"});  // throws if it is a link
+  const auto owner = steps.read_if_exists("session", kMaxMarkBytes);
   if (owner && (session.empty() || *owner != kNoOwner)) return;
   // The list of files that do not require a plan, written before the mark: a folder without the
   // mark is free.
-  steps.replace_file_atomically(kOutputs, "junit.xml\nsession.json\n");
-  steps.replace_file_atomically("session", owner_mark_text(session));
+  steps.replace_file(kOutputs, "junit.xml\nsession.json\n");
+  steps.replace_file("session", owner_mark_text(session));
 }
 
 SessionResults::~SessionResults() { ::close(lock_); }
@@ -154,12 +154,12 @@ fs::path SessionResults::results_file_path(const std::string& name) const {
 }
 
 fs::path SessionResults::step_record_file(const std::string& step) const {
-  return folder_ / step_record_file_name(step);
+  return folder_ / step_file_name(step);
 }
 
-std::set<std::string> SessionResults::list_recorded_output_files() const {
+std::set<std::string> SessionResults::list_recorded() const {
   constexpr std::size_t max_bytes = 1 << 20;
-  const auto list = make_steps_folder(folder_).read_file_if_exists(kOutputs, max_bytes);
+  const auto list = make_steps_folder(folder_).read_if_exists(kOutputs, max_bytes);
   // Foreign files could not be distinguished from outputs.
   if (!list) {
     throw InputError(folder_ / "steps" / kOutputs,
@@ -173,10 +173,9 @@ std::set<std::string> SessionResults::list_recorded_output_files() const {
   return names;
 }
 
-std::set<std::string> SessionResults::remove_unwanted_output_files(
-    const std::set<std::string>& wanted) const {
+std::set<std::string> SessionResults::remove_unwanted(const std::set<std::string>& wanted) const {
   std::set<std::string> not_removed;
-  for (const std::string& name : list_recorded_output_files()) {
+  for (const std::string& name : list_recorded()) {
     if (wanted.contains(name)) continue;
     std::error_code error;
     fs::remove(folder_ / name, error);
@@ -187,10 +186,10 @@ std::set<std::string> SessionResults::remove_unwanted_output_files(
 
 void SessionResults::write_output_list(const std::set<std::string>& names) const {
   const SharedFolder records = make_steps_folder(folder_);
-  if (names == list_recorded_output_files()) return;
+  if (names == list_recorded()) return;
   std::string list;
   for (const std::string& name : names) list.append(name).append("\n");
-  records.replace_file_atomically(kOutputs, list);
+  records.replace_file(kOutputs, list);
 }
 
 void SessionResults::set_steps(std::vector<StepOutputs> steps) {
@@ -198,13 +197,13 @@ void SessionResults::set_steps(std::vector<StepOutputs> steps) {
   wanted_ = {"session.json", "junit.xml"};
   for (const auto& [step, files] : steps_) {
     wanted_.insert(files.begin(), files.end());
-    wanted_.insert(step_record_file_name(step));
+    wanted_.insert(step_file_name(step));
     for (const std::string& file : files) {
       if (fs::is_regular_file(fs::symlink_status(new_outputs_folder() / file)))
         new_outputs_.insert(file);
     }
   }
-  std::set<std::string> written = list_recorded_output_files();
+  std::set<std::string> written = list_recorded();
   for (const std::string& name : wanted_) {
     if (is_existing(folder_ / name) &&
         (!written.contains(name) || fs::is_symlink(folder_ / name))) {
@@ -226,68 +225,66 @@ void SessionResults::publish_outputs() {
   }
   new_outputs_.clear();
   fs::remove_all(new_outputs_folder(), missing);
-  std::set<std::string> names = remove_unwanted_output_files(wanted_);  // the next run tries again
+  std::set<std::string> names = remove_unwanted(wanted_);  // the next run tries again
   names.insert(wanted_.begin(), wanted_.end());
   write_output_list(names);
 }
 
-std::optional<StepResult> SessionResults::find_cached_step_result(const std::string& step,
-                                                                  const std::string& key) const {
+std::optional<StepResult> SessionResults::find_cached(const std::string& step,
+                                                      const std::string& key) const {
   auto cached_result = read_step_record(step_record_file(step));
   if (!cached_result || cached_result->result.failure == StepFailure::bad_input)
     return std::nullopt;
-  if (cached_result->key != key || cached_result->outputs != compute_step_outputs_digest(step))
+  if (cached_result->key != key || cached_result->outputs != digest_outputs(step))
     return std::nullopt;
   return std::move(cached_result->result);
 }
 
 void SessionResults::store_step_result(const std::string& step, const std::string& key,
                                        const StepResult& result) const {
-  write_step_record(step_record_file(step), {key, compute_step_outputs_digest(step), result});
+  write_step_record(step_record_file(step), {key, digest_outputs(step), result});
 }
 
-std::vector<std::string> SessionResults::list_planned_output_files(const std::string& step) const {
+std::vector<std::string> SessionResults::list_planned(const std::string& step) const {
   const auto found = std::ranges::find(steps_, step, &StepOutputs::step);
   return found == steps_.end() ? std::vector<std::string>() : found->files;
 }
 
-std::string SessionResults::compute_step_outputs_digest(const std::string& step) const {
+std::string SessionResults::digest_outputs(const std::string& step) const {
   std::string digests;
-  for (const std::string& output : list_planned_output_files(step)) {
-    digests +=
-        output + " " +
-        (fs::exists(results_file_path(output)) ? compute_file_sha256(results_file_path(output))
-                                               : "") +
-        "\n";
+  for (const std::string& output : list_planned(step)) {
+    digests += output + " " +
+               (fs::exists(results_file_path(output)) ? hash_file(results_file_path(output)) : "") +
+               "\n";
   }
-  return compute_text_sha256(digests);
+  return hash_text(digests);
 }
 
-void SessionResults::remove_outputs_of_step(const std::string& step) {
+void SessionResults::remove_outputs(const std::string& step) {
   std::error_code ignored;
   fs::remove(step_record_file(step), ignored);
-  make_steps_folder(folder_).open_or_create_subfolder({"new", folder_, "step"});
-  for (const std::string& output : list_planned_output_files(step)) {
+  make_steps_folder(folder_).open_or_create({"new", folder_, "step"});
+  for (const std::string& output : list_planned(step)) {
     new_outputs_.insert(output);
     fs::remove(results_file_path(output), ignored);
   }
 }
 
-void SessionResults::remove_outputs_of_later_steps(const std::string& step) {
+void SessionResults::remove_later_outputs(const std::string& step) {
   bool is_later = false;
   for (const auto& [name, files] : steps_) {
-    if (is_later) remove_outputs_of_step(name);
+    if (is_later) remove_outputs(name);
     is_later = is_later || name == step;
   }
 }
 
-void SessionResults::remove_evaluation_outputs() const {
-  const std::set<std::string> written = list_recorded_output_files();
+void SessionResults::remove_evaluation() const {
+  const std::set<std::string> written = list_recorded();
   for (const char* name : {"evaluation.json", "report.html", "steps/evaluate.json"}) {
     if (written.contains(name)) fs::remove(folder_ / name);
   }
 }
 
-void SessionResults::remove_outputs_of_all_steps() const { remove_unwanted_output_files({}); }
+void SessionResults::remove_all_outputs() const { remove_unwanted({}); }
 
 }  // namespace vlp

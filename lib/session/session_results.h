@@ -21,8 +21,8 @@ struct StepOutputs {
 /// Writes junit.xml with an error in place of that of an earlier run, for a run that is refused
 /// before its first step, also in the results of another session, which CI would read as those of
 /// this run. Leaves a folder unchanged that is in use, or that holds no results of a session.
-void write_refusal_junit_xml(const std::filesystem::path& results,
-                             const std::filesystem::path& session, const std::string& message);
+void write_refusal_junit(const std::filesystem::path& results, const std::filesystem::path& session,
+                         const std::string& message);
 
 /// Folder with the results of a session, which one run at a time may use. Results of an earlier run
 /// are reused for steps whose inputs have not changed. Content:
@@ -50,14 +50,14 @@ class SessionResults {
   SessionResults(const SessionResults&) = delete;
   SessionResults& operator=(const SessionResults&) = delete;
 
-  const std::filesystem::path& results_folder_path() const { return folder_; }
+  const std::filesystem::path& path() const { return folder_; }
   /// Returns the path of an output: in steps/new if this run makes it again, if a run that was
   /// killed made it, or if it is of no step of this run.
   std::filesystem::path results_file_path(const std::string& name) const;
   /// Returns the folder steps/new.
   std::filesystem::path new_outputs_folder() const { return folder_ / "steps/new"; }
   /// Returns the folder with the cached corners of boards.
-  std::filesystem::path corner_cache_folder() const { return folder_ / "steps/corners"; }
+  std::filesystem::path cache_folder() const { return folder_ / "steps/corners"; }
 
   /// Sets the steps of this run, in their order. Throws InputError if the run would overwrite a
   /// file that no run wrote.
@@ -69,31 +69,30 @@ class SessionResults {
   /// Returns the result of the last execution of a step if it is up to date. `key`, the digest of
   /// all that the step depends on, and the outputs must be unchanged. Returns std::nullopt
   /// otherwise, and after bad_input, because the file may have been corrected.
-  std::optional<StepResult> find_cached_step_result(const std::string& step,
-                                                    const std::string& key) const;
+  std::optional<StepResult> find_cached(const std::string& step, const std::string& key) const;
   /// Records the result of a step, with its key and the digest of its outputs.
   void store_step_result(const std::string& step, const std::string& key,
                          const StepResult& result) const;
 
   /// Removes the record of a step, and its outputs with publish_outputs() if they are not made
   /// again.
-  void remove_outputs_of_step(const std::string& step);
-  /// Applies remove_outputs_of_step() to all steps after `step`.
-  void remove_outputs_of_later_steps(const std::string& step);
+  void remove_outputs(const std::string& step);
+  /// Applies remove_outputs() to all steps after `step`.
+  void remove_later_outputs(const std::string& step);
   /// Removes outputs and record of the step evaluate, which depend on the gates. Does not require
   /// set_steps().
-  void remove_evaluation_outputs() const;
+  void remove_evaluation() const;
   /// Removes outputs and records of all steps. Does not require set_steps().
-  void remove_outputs_of_all_steps() const;
+  void remove_all_outputs() const;
 
  private:
   std::filesystem::path step_record_file(const std::string& step) const;
-  std::set<std::string> list_recorded_output_files() const;
+  std::set<std::string> list_recorded() const;
   /// Returns the files of a step of this run; none for other steps.
-  std::vector<std::string> list_planned_output_files(const std::string& step) const;
+  std::vector<std::string> list_planned(const std::string& step) const;
   /// Removes the outputs that are not wanted. Returns those that cannot be removed.
-  std::set<std::string> remove_unwanted_output_files(const std::set<std::string>& wanted) const;
-  std::string compute_step_outputs_digest(const std::string& step) const;
+  std::set<std::string> remove_unwanted(const std::set<std::string>& wanted) const;
+  std::string digest_outputs(const std::string& step) const;
 
   /// Writes the list of outputs if it changes, which avoids waiting for the disk.
   void write_output_list(const std::set<std::string>& names) const;

@@ -10,25 +10,25 @@
 
 namespace vlp {
 
-std::string last_path_component(const std::filesystem::path& path) {
+std::string last_component(const std::filesystem::path& path) {
   return std::filesystem::weakly_canonical(path).filename().string();
 }
 
-const std::string& InputDigests::compute_file_digest(const std::filesystem::path& file) {
+const std::string& InputDigests::digest_file(const std::filesystem::path& file) {
   const auto known = known_.find(file);
   return known != known_.end() ? known->second
-                               : known_.emplace(file, compute_file_sha256(file)).first->second;
+                               : known_.emplace(file, hash_file(file)).first->second;
 }
 
-std::string InputDigests::compute_image_folder_digest(const std::filesystem::path& folder) {
+std::string InputDigests::digest_images(const std::filesystem::path& folder) {
   std::string digests;
   for (const auto& image : list_images(folder)) {
-    digests += fmt::format("{}  {}\n", compute_file_digest(image), image.filename().string());
+    digests += fmt::format("{}  {}\n", digest_file(image), image.filename().string());
   }
-  return compute_text_sha256(digests);
+  return hash_text(digests);
 }
 
-std::string InputDigests::compute_folder_digest(const std::filesystem::path& folder) {
+std::string InputDigests::digest_folder(const std::filesystem::path& folder) {
   std::map<std::string, std::string> digests;
   std::error_code error;
   for (std::filesystem::recursive_directory_iterator entry(folder, error), end;
@@ -37,27 +37,25 @@ std::string InputDigests::compute_folder_digest(const std::filesystem::path& fol
     if (!entry->is_regular_file(no_file)) continue;
     std::string& digest = digests[entry->path().lexically_relative(folder).string()];
     try {
-      digest = compute_file_digest(entry->path());
+      digest = digest_file(entry->path());
     } catch (const InputError&) {
       digest = "cannot be read";
     }
   }
   std::string text;
   for (const auto& [name, digest] : digests) text += fmt::format("{}  {}\n", digest, name);
-  return compute_text_sha256(text);
+  return hash_text(text);
 }
 
-HistoryEntry make_calibration_history_entry(const ProgramVersion& program,
-                                            const std::string& options,
-                                            const std::vector<std::filesystem::path>& inputs,
-                                            InputDigests& digests) {
+HistoryEntry make_history_entry(const ProgramVersion& program, const std::string& options,
+                                const std::vector<std::filesystem::path>& inputs,
+                                InputDigests& digests) {
   HistoryEntry entry{"", program.program, program.version, options, {}};
   for (const auto& input : inputs) {
     if (input.empty()) continue;
-    entry.inputs.push_back(
-        {last_path_component(input), std::filesystem::is_directory(input)
-                                         ? digests.compute_image_folder_digest(input)
-                                         : digests.compute_file_digest(input)});
+    entry.inputs.push_back({last_component(input), std::filesystem::is_directory(input)
+                                                       ? digests.digest_images(input)
+                                                       : digests.digest_file(input)});
   }
   return entry;
 }

@@ -21,13 +21,13 @@ struct ProgramVersion {
 class InputDigests {
  public:
   /// Returns the digest of a file's content. Throws InputError if the file cannot be read.
-  const std::string& compute_file_digest(const std::filesystem::path& file);
+  const std::string& digest_file(const std::filesystem::path& file);
   /// Returns the digest of the images in a folder: that of a text with a line "SHA-256  NAME" per
   /// image, by name. Throws InputError if an image cannot be read.
-  std::string compute_image_folder_digest(const std::filesystem::path& folder);
+  std::string digest_images(const std::filesystem::path& folder);
   /// Returns the digest of all files in a folder and its subfolders, in the form of
-  /// compute_image_folder_digest(). A file that cannot be read enters as "cannot be read".
-  std::string compute_folder_digest(const std::filesystem::path& folder);
+  /// digest_images(). A file that cannot be read enters as "cannot be read".
+  std::string digest_folder(const std::filesystem::path& folder);
 
  private:
   std::map<std::filesystem::path, std::string> known_;
@@ -36,12 +36,11 @@ class InputDigests {
 /// Returns an entry for the history, without the part's name. `inputs` are files and folders of
 /// images; an empty name is an input that was not given. Stores only the last component of each
 /// path, because folders differ between machines. Throws InputError if an input cannot be read.
-HistoryEntry make_calibration_history_entry(const ProgramVersion& program,
-                                            const std::string& options,
-                                            const std::vector<std::filesystem::path>& inputs,
-                                            InputDigests& digests);
+HistoryEntry make_history_entry(const ProgramVersion& program, const std::string& options,
+                                const std::vector<std::filesystem::path>& inputs,
+                                InputDigests& digests);
 
 /// Returns the last component of a path, also for ".".
-std::string last_path_component(const std::filesystem::path& path);
+std::string last_component(const std::filesystem::path& path);
 
 }  // namespace vlp

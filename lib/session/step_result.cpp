@@ -29,8 +29,7 @@ struct SkippedFrames {
   int count;
 };
 
-void prepend_observation_messages(const std::vector<std::string>& remarks,
-                                  std::vector<std::string>& all) {
+void prepend_messages(const std::vector<std::string>& remarks, std::vector<std::string>& all) {
   all.insert(all.begin(), remarks.begin(), remarks.end());
 }
 
@@ -43,7 +42,7 @@ std::string_view step_failure_name(StepFailure failure) {
   return "";
 }
 
-std::optional<StepFailure> step_failure_from_name(std::string_view name) {
+std::optional<StepFailure> failure_from_name(std::string_view name) {
   for (const auto& [failure, known] : kNames) {
     if (known == name) return failure;
   }
@@ -59,7 +58,7 @@ std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& im
   for (const Observation& image : images) {
     if (image.is_image_kept()) continue;
     const std::string name = is_one_folder ? image.image_file_name() : image.file.string();
-    const auto video = parse_video_name_from_frame_name(name);
+    const auto video = parse_video_name(name);
     if (!video) {
       skipped.push_back({name, image.rejection->message});
       continue;
@@ -75,8 +74,7 @@ std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& im
     }
   }
   for (const auto& [video, reason, count] : frames) {
-    skipped.push_back(
-        {video, fmt::format("{} of its frames: {}", count, rejection_reason_phrase(reason))});
+    skipped.push_back({video, fmt::format("{} of its frames: {}", count, reason_phrase(reason))});
   }
   return skipped;
 }
@@ -85,7 +83,7 @@ namespace {
 
 /// Warns of images that are used in spite of a doubt: their number, the first names, and the first
 /// doubt.
-void warn_about_doubtful_images(const std::vector<Observation>& images, StepResult& result) {
+void warn_about_images(const std::vector<Observation>& images, StepResult& result) {
   constexpr int max_names = 3;
   std::string names, first_doubt;
   int count = 0;
@@ -104,16 +102,15 @@ void warn_about_doubtful_images(const std::vector<Observation>& images, StepResu
 
 }  // namespace
 
-void add_image_intake_remarks(const Observations& seen, StepResult& result) {
+void add_intake_remarks(const Observations& seen, StepResult& result) {
   const auto skipped = list_skipped_images(seen.images);
   result.skipped.insert(result.skipped.begin(), skipped.begin(), skipped.end());
-  prepend_observation_messages(seen.warnings, result.warnings);
-  prepend_observation_messages(seen.notes, result.notes);
-  prepend_observation_messages(seen.details, result.details);
-  warn_about_doubtful_images(seen.images, result);
+  prepend_messages(seen.warnings, result.warnings);
+  prepend_messages(seen.notes, result.notes);
+  prepend_messages(seen.details, result.details);
+  warn_about_images(seen.images, result);
   for (const Observation& image : seen.images) {
-    if (image.is_image_kept() || !parse_video_name_from_frame_name(image.image_file_name()))
-      continue;
+    if (image.is_image_kept() || !parse_video_name(image.image_file_name())) continue;
     result.details.push_back(image.image_file_name() + ": " + image.rejection->message);
   }
   if (!seen.failure) return;

@@ -74,7 +74,7 @@ struct StepResult {
 /// "wrong_map".
 std::string_view step_failure_name(StepFailure failure);
 /// Returns the failure with this name; std::nullopt if there is none.
-std::optional<StepFailure> step_failure_from_name(std::string_view name);
+std::optional<StepFailure> failure_from_name(std::string_view name);
 
 /// Returns the rejected images with their reasons. Names include the folder if there are several
 /// folders. Rejected frames of a video are combined to one entry per reason, with their number.
@@ -82,7 +82,7 @@ std::vector<SkippedImage> list_skipped_images(const std::vector<Observation>& im
 
 /// Adds the remarks of an intake to the result of a step: skipped images, warnings, notes, details.
 /// Fails the step if no image can be used.
-void add_image_intake_remarks(const Observations& seen, StepResult& result);
+void add_intake_remarks(const Observations& seen, StepResult& result);
 
 /// Returns "FILE: message", or the message alone without a file.
 std::string format_failure_message(const StepResult& result);

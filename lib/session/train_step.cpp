@@ -64,9 +64,9 @@ bool has_kept_examples(const LampClassifier& classifier, TrainStepResult& result
   return false;
 }
 
-void warn_about_inseparable_lamps(const LampClassifier& classifier, TrainStepResult& result) {
+void warn_about_inseparable(const LampClassifier& classifier, TrainStepResult& result) {
   constexpr std::size_t max_lines = 10;
-  const auto pairs = find_inseparable_lamps(classifier);
+  const auto pairs = list_inseparable(classifier);
   for (std::size_t i = 0; i < std::min(pairs.size(), max_lines); ++i) {
     // [LAMP-11] `look alike`
     result.warnings.push_back(
@@ -84,24 +84,22 @@ void warn_about_inseparable_lamps(const LampClassifier& classifier, TrainStepRes
 void warn_about_row_time(const DetectedLights& seen, const std::vector<std::vector<Frame>>& labels,
                          const LampMap& lamps, TrainStepResult& result) {
   if (!seen.camera.row_time_s) return;
-  const auto measured = select_row_time_by_periods_and_positions(seen.observations_by_folder(),
-                                                                 labels, lamps, seen.camera.lens)
-                            .row_time;
+  const auto measured =
+      estimate_row_time(seen.by_folder(), labels, lamps, seen.camera.lens).row_time;
   if (!measured) return;
   std::string error =
-      describe_row_time_contradiction(*measured, {*seen.camera.row_time_s, "the calibration"});
+      describe_wrong_row_time(*measured, {*seen.camera.row_time_s, "the calibration"});
   if (!error.empty()) result.warnings.push_back(std::move(error));
 }
 
 }  // namespace
 
-TrainStepResult train_lamp_classifier(const DetectedLights& seen,
-                                      const std::vector<std::vector<Frame>>& labels,
-                                      const LampMap& lamps,
-                                      const std::filesystem::path& first_folder) {
+TrainStepResult run_train_step(const DetectedLights& seen,
+                               const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
+                               const std::filesystem::path& first_folder) {
   TrainStepResult result;
   LabeledLights& labeled = result.labeled;
-  const auto folders = seen.observations_by_folder();
+  const auto folders = seen.by_folder();
   for (std::size_t i = 0; i < labels.size(); ++i) {
     add_labeled_lights(folders[i], labels[i], labeled);
   }
@@ -111,11 +109,11 @@ TrainStepResult train_lamp_classifier(const DetectedLights& seen,
                      "equal, with their endings");
   }
   if (!has_examples(labeled.lights, lamps, result)) return result;
-  result.classifier = fit_lamp_classifier(labeled.lights);
+  result.classifier = fit_classifier(labeled.lights);
   result.classifier.row_time_s = seen.camera.row_time_s;
   if (!has_kept_examples(result.classifier, result)) return result;
-  result.confusion = cross_validate_lamp_classifier(labeled.lights, fit_lamp_classifier);
-  warn_about_inseparable_lamps(result.classifier, result);
+  result.confusion = cross_validate(labeled.lights, fit_classifier);
+  warn_about_inseparable(result.classifier, result);
   warn_about_row_time(seen, labels, lamps, result);
   return result;
 }

@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// Result of train_lamp_classifier().
+/// Result of run_train_step().
 struct TrainStepResult : StepResult {
   LabeledLights labeled;
   LampClassifier classifier;
@@ -22,15 +22,14 @@ struct TrainStepResult : StepResult {
 
 /// Trains the lamp classifier with the lights that the labels of each folder identify. Warns of
 /// inseparable lamps, and if lamps with known frequencies contradict the row time of the
-/// calibration (describe_row_time_contradiction()). Failure: undetermined, if there is one lamp
+/// calibration (describe_wrong_row_time()). Failure: undetermined, if there is one lamp
 /// only, or a lamp has too few lights or too dissimilar ones.
 ///
 /// @param first_folder  folder named in the error about labels
 /// @throws InputError if the labels name no usable image of any folder
 /// @throws std::invalid_argument if the labels name a lamp that is not in the map
-TrainStepResult train_lamp_classifier(const DetectedLights& seen,
-                                      const std::vector<std::vector<Frame>>& labels,
-                                      const LampMap& lamps,
-                                      const std::filesystem::path& first_folder);
+TrainStepResult run_train_step(const DetectedLights& seen,
+                               const std::vector<std::vector<Frame>>& labels, const LampMap& lamps,
+                               const std::filesystem::path& first_folder);
 
 }  // namespace vlp

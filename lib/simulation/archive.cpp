@@ -100,7 +100,7 @@ void draw_camera(Scene& scene, const ArchiveVariation& variation, cv::RNG random
 }
 
 void draw_session(Scene& scene, const ArchiveVariation& variation, cv::RNG random) {
-  scene.seed = draw_seed_from_generator(random);
+  scene.seed = draw_seed(random);
   for (SceneLamp& lamp : scene.lamps) {
     for (double& part : lamp.map_error_m) {
       part += variation.map_error_m * random.uniform(-1.0, 1.0);
@@ -130,28 +130,28 @@ void check(const Scene& scene) {
 void write_table(const Scene& scene, std::size_t sessions, const fs::path& output) {
   CsvWriter table(output / "archive.csv", {"camera", "session", "fault", "damage", "damaged"});
   for (std::size_t i = 0; i < sessions; ++i) {
-    const ArchiveSession session = make_simulated_archive_session(scene, i);
+    const ArchiveSession session = make_archive_session(scene, i);
     table.write_csv_row({session.camera, session.session, archive_fault_name(session.fault),
-                         archive_damage_name(session.damage), session.damaged});
+                         damage_name(session.damage), session.damaged});
   }
   table.save_file();
 }
 
 /// Renders a session into a temporary folder, then moves it into place. Returns false if the
 /// session exists already.
-bool render_archive_session(const ArchiveSession& session, const fs::path& output,
-                            const std::string& provenance) {
+bool render_session(const ArchiveSession& session, const fs::path& output,
+                    const std::string& provenance) {
   const fs::path place = output / session.camera / session.session;
   if (fs::exists(place)) return false;
   const fs::path unfinished = output / ".unfinished" / (session.camera + "-" + session.session);
   fs::create_directories(place.parent_path());
   fs::create_directories(unfinished);
   const std::string first_line = provenance.substr(0, provenance.find('\n'));
-  render_scene_to_folder(
+  render_scene(
       session.scene, unfinished,
       {{}, 1, first_line + ": " + session.camera + "/" + session.session + " of an archive\n"},
       [](const SimulationSummary&, std::size_t) {});
-  apply_simulated_damage_to_session_files(session, unfinished);
+  damage_session(session, unfinished);
   fs::rename(unfinished, place);
   return true;
 }
@@ -162,12 +162,11 @@ std::string_view archive_fault_name(ArchiveFault fault) {
   return kFaultNames[static_cast<std::size_t>(fault)];
 }
 
-std::string_view archive_damage_name(ArchiveDamage damage) {
+std::string_view damage_name(ArchiveDamage damage) {
   return kDamageNames[static_cast<std::size_t>(damage)];
 }
 
-void apply_simulated_damage_to_session_files(const ArchiveSession& session,
-                                             const fs::path& folder) {
+void damage_session(const ArchiveSession& session, const fs::path& folder) {
   if (session.fault == ArchiveFault::cut_image) {
     const auto& sets = session.scene.sets;
     const auto lamps =
@@ -196,7 +195,7 @@ void apply_simulated_damage_to_session_files(const ArchiveSession& session,
   }
 }
 
-ArchiveSession make_simulated_archive_session(const Scene& scene, std::size_t index) {
+ArchiveSession make_archive_session(const Scene& scene, std::size_t index) {
   const ArchiveVariation& variation = *scene.archive;
   const auto per_camera = static_cast<std::size_t>(variation.sessions_per_camera);
   const std::size_t camera = index / per_camera;
@@ -207,10 +206,8 @@ ArchiveSession make_simulated_archive_session(const Scene& scene, std::size_t in
                          ArchiveDamage::none,
                          ""};
   session.scene.camera.id = session.camera;
-  draw_camera(session.scene, variation,
-              make_seeded_random_generator(scene.seed, "archive camera", camera));
-  draw_session(session.scene, variation,
-               make_seeded_random_generator(scene.seed, "archive session", index));
+  draw_camera(session.scene, variation, make_generator(scene.seed, "archive camera", camera));
+  draw_session(session.scene, variation, make_generator(scene.seed, "archive session", index));
   const auto fault = find_chosen_index(index, variation.fault_fraction);
   if (const auto damage_target = find_chosen_index(index, variation.damage_fraction)) {
     std::tie(session.damage, session.damaged) =
@@ -222,9 +219,9 @@ ArchiveSession make_simulated_archive_session(const Scene& scene, std::size_t in
   return session;
 }
 
-SimulationSummary simulate_session_archive(const Scene& scene, std::size_t sessions,
-                                           const fs::path& output, const SimulationOptions& options,
-                                           const SimulationProgress& progress) {
+SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions, const fs::path& output,
+                                   const SimulationOptions& options,
+                                   const SimulationProgress& progress) {
   check(scene);
   claim_output_folder(output, options.provenance);
   write_table(scene, sessions, output);
@@ -232,8 +229,8 @@ SimulationSummary simulate_session_archive(const Scene& scene, std::size_t sessi
   std::mutex counting;
   try {
     parallel_for(sessions, options.threads, [&](std::size_t index) {
-      const bool rendered = render_archive_session(make_simulated_archive_session(scene, index),
-                                                   output, options.provenance);
+      const bool rendered =
+          render_session(make_archive_session(scene, index), output, options.provenance);
       const std::lock_guard lock(counting);
       ++(rendered ? summary.rendered : summary.existing);
       progress(summary, sessions);

@@ -43,7 +43,7 @@ struct ArchiveSession {
 
 /// Returns the names used in archive.csv; empty for `none`.
 std::string_view archive_fault_name(ArchiveFault fault);
-std::string_view archive_damage_name(ArchiveDamage damage);
+std::string_view damage_name(ArchiveDamage damage);
 
 /// Returns session `index` of an archive, counted from 0. It depends on scene and index only, so
 /// that an archive can grow without changes to existing sessions.
@@ -52,23 +52,22 @@ std::string_view archive_damage_name(ArchiveDamage damage);
 /// fault, to within one. A session chosen for both is damaged only. Kinds of fault and of damage
 /// are used cyclically.
 /// @pre the scene has an `archive`
-ArchiveSession make_simulated_archive_session(const Scene& scene, std::size_t index);
+ArchiveSession make_archive_session(const Scene& scene, std::size_t index);
 
 /// Applies the cut_image fault and the damage of a session to its files in `folder`. A second call
 /// has no further effect.
-void apply_simulated_damage_to_session_files(const ArchiveSession& session,
-                                             const std::filesystem::path& folder);
+void damage_session(const ArchiveSession& session, const std::filesystem::path& folder);
 
 /// Renders the first `sessions` sessions of an archive into `output`:
 ///   scene.yaml, archive.csv (camera, session, fault, damage, damaged)
-///   CAMERA/SESSION/ with the files of render_scene_to_folder(), then damaged
+///   CAMERA/SESSION/ with the files of render_scene(), then damaged
 /// Sessions are written atomically. Existing sessions are kept (SimulationSummary counts sessions).
 /// The bytes depend on the scene alone.
-/// @throws as render_scene_to_folder(); std::invalid_argument if the scene has no `archive`, no
+/// @throws as render_scene(); std::invalid_argument if the scene has no `archive`, no
 /// lamps, no board, or lacks one of the folders `boards` and `rotation`
-SimulationSummary simulate_session_archive(const Scene& scene, std::size_t sessions,
-                                           const std::filesystem::path& output,
-                                           const SimulationOptions& options,
-                                           const SimulationProgress& progress);
+SimulationSummary simulate_archive(const Scene& scene, std::size_t sessions,
+                                   const std::filesystem::path& output,
+                                   const SimulationOptions& options,
+                                   const SimulationProgress& progress);
 
 }  // namespace vlp

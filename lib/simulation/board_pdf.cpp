@@ -25,8 +25,7 @@ using Surface = std::unique_ptr<cairo_surface_t, void (*)(cairo_surface_t*)>;
 
 /// Returns the width of the border around the tag field that is printed or has to stay white.
 double get_page_margin_m(const Board& board) {
-  if (board.has_chessboard_squares() || board.corner_squares)
-    return compute_printed_margin_around_tags_m(board);
+  if (board.has_squares() || board.corner_squares) return compute_printed_margin_m(board);
   return std::min(board.tag_size_m * board.tag_spacing, board.tag_size_m) / 2;
 }
 
@@ -59,24 +58,24 @@ void draw_board(cairo_t* context, const Board& board) {
   cairo_fill(context);
 }
 
-std::string format_length_in_mm(double length_m) {
+std::string format_mm(double length_m) {
   constexpr double um_per_m = 1e6, um_per_mm = 1e3;
-  return format_shortest_exact_number(std::round(length_m * um_per_m) / um_per_mm) + " mm";
+  return format_exact_number(std::round(length_m * um_per_m) / um_per_mm) + " mm";
 }
 
 std::string describe_parameters(const Board& board) {
   if (board.kind == BoardKind::apriltags) {
     return fmt::format("{}, {} x {} tags of {}, gap {}, ids from {}, {}{}", board.family,
-                       board.cols, board.rows, format_length_in_mm(board.tag_size_m),
-                       format_length_in_mm(board.tag_size_m * board.tag_spacing), board.first_id,
+                       board.cols, board.rows, format_mm(board.tag_size_m),
+                       format_mm(board.tag_size_m * board.tag_spacing), board.first_id,
                        id_order_name(board.id_order),
                        board.border_bits == 2 ? ", Kalibr AprilGrid" : "");
   }
-  const std::string squares = fmt::format("{} x {} squares of {}", board.cols, board.rows,
-                                          format_length_in_mm(board.square_size_m));
+  const std::string squares =
+      fmt::format("{} x {} squares of {}", board.cols, board.rows, format_mm(board.square_size_m));
   if (board.kind == BoardKind::chessboard) return "chessboard, " + squares;
   return fmt::format("ChArUco, {}, markers of {}, {} from id {}", squares,
-                     format_length_in_mm(board.tag_size_m), board.family, board.first_id);
+                     format_mm(board.tag_size_m), board.family, board.first_id);
 }
 
 void draw_footer(cairo_t* context, const Board& board) {
@@ -112,7 +111,7 @@ const std::vector<PageSize>& list_page_sizes() {
   return all;
 }
 
-const PageSize& find_page_size_by_name(const std::string& name) {
+const PageSize& require_page_size(const std::string& name) {
   for (const PageSize& paper : list_page_sizes()) {
     if (paper.name == name) return paper;
   }
@@ -122,10 +121,10 @@ const PageSize& find_page_size_by_name(const std::string& name) {
   throw std::invalid_argument("there is no paper '" + name + "', only " + names);
 }
 
-std::optional<double> find_largest_tag_size_for_page_m(const Board& board, const PageSize& paper) {
+std::optional<double> find_tag_size_m(const Board& board, const PageSize& paper) {
   constexpr int min_mm = 5, max_mm = 1000;
   Board candidate = board;
-  double& size_m = board.has_chessboard_squares() ? candidate.square_size_m : candidate.tag_size_m;
+  double& size_m = board.has_squares() ? candidate.square_size_m : candidate.tag_size_m;
   for (int size_mm = max_mm; size_mm >= min_mm; --size_mm) {
     size_m = size_mm / 1000.0;
     if (find_sheet_m(candidate, paper)) return size_m;
@@ -137,9 +136,8 @@ std::string render_board_pdf(const Board& board, const PageSize& paper) {
   const auto sheet_m = find_sheet_m(board, paper);
   if (!sheet_m) {
     const Eigen::Vector2d needed_m = printed_size_m(board);
-    throw std::invalid_argument("the board is " + format_length_in_mm(needed_m.x()) + " x " +
-                                format_length_in_mm(needed_m.y()) + " and does not fit on " +
-                                paper.name);
+    throw std::invalid_argument("the board is " + format_mm(needed_m.x()) + " x " +
+                                format_mm(needed_m.y()) + " and does not fit on " + paper.name);
   }
   std::string bytes;
   {

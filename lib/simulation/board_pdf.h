@@ -23,12 +23,12 @@ const std::vector<PageSize>& list_page_sizes();
 
 /// Returns the page size of this name.
 /// @throws std::invalid_argument with the valid names, if there is none
-const PageSize& find_page_size_by_name(const std::string& name);
+const PageSize& require_page_size(const std::string& name);
 
 /// Computes the largest tag size (or square size) for which the board fits on a page, portrait or
 /// landscape, in whole millimeters. Returns std::nullopt if it is below 5 mm. Ignores the
 /// tag_size_m or square_size_m of `board`.
-std::optional<double> find_largest_tag_size_for_page_m(const Board& board, const PageSize& paper);
+std::optional<double> find_tag_size_m(const Board& board, const PageSize& paper);
 
 /// Renders the board as a PDF at true scale, centered on a page in portrait or landscape
 /// orientation. The page shows the parameters of the board and a ruler of 100 mm for checking the

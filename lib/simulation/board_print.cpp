@@ -46,7 +46,7 @@ void add_squares(const Board& board, const InkRadiances& ink, std::vector<Rectan
 }
 
 TagPattern make_tag_bits(const Board& board, int id) {
-  if (!board.has_chessboard_squares()) return make_tag_pattern(board.family, id, board.border_bits);
+  if (!board.has_squares()) return make_tag_pattern(board.family, id, board.border_bits);
   const ArucoMarker marker = make_aruco_marker(board.family, id);
   TagPattern pattern{marker.width + 2, 0, {}};
   pattern.white.assign(pattern.flat_bit_index(0, pattern.pattern_width_bits()), false);
@@ -82,7 +82,7 @@ void add_tag(const Board& board, const BoardTag& tag, const InkRadiances& ink,
 std::vector<Rectangle> make_rectangles(const SceneBoard& board) {
   const InkRadiances ink{board.white_e_per_s - board.surround_e_per_s,
                          board.black_e_per_s - board.surround_e_per_s};
-  const double margin_m = board.margin_m + compute_printed_margin_around_tags_m(board.pattern);
+  const double margin_m = board.margin_m + compute_printed_margin_m(board.pattern);
   const Eigen::Vector2d field_m = compute_tag_field_size_m(board.pattern);
   std::vector<Rectangle> all = make_board_pattern(board.pattern, ink);
   all.insert(all.begin(),
@@ -124,14 +124,14 @@ TagPattern make_tag_pattern(const std::string& name, int id, int border_bits) {
 
 std::vector<Rectangle> make_board_pattern(const Board& board, const InkRadiances& ink) {
   std::vector<Rectangle> all;
-  if (board.has_chessboard_squares()) add_squares(board, ink, all);
+  if (board.has_squares()) add_squares(board, ink, all);
   if (board.corner_squares) add_corner_squares(board, ink, all);
   for (const BoardTag& tag : list_board_tags(board)) add_tag(board, tag, ink, all);
   return all;
 }
 
-double compute_printed_margin_around_tags_m(const Board& board) {
-  if (board.has_chessboard_squares()) return board.square_size_m;
+double compute_printed_margin_m(const Board& board) {
+  if (board.has_squares()) return board.square_size_m;
   return board.corner_squares ? board.tag_size_m * board.tag_spacing : 0;
 }
 
@@ -139,7 +139,7 @@ BoardWarp::BoardWarp(const SceneBoard& board)
     : inverse_half_field_per_m_(2 / compute_tag_field_size_m(board.pattern).array()),
       warp_m_(board.warp_m) {}
 
-BoardWarp::Depth BoardWarp::compute_board_deflection(const Eigen::Vector2d& at_m) const {
+BoardWarp::Depth BoardWarp::deflect(const Eigen::Vector2d& at_m) const {
   Depth warp{0, {0, 0}};
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const double fraction = at_m[axis] * inverse_half_field_per_m_[axis] - 1;
@@ -154,7 +154,7 @@ BoardWarp::Depth BoardWarp::compute_board_deflection(const Eigen::Vector2d& at_m
 BoardPattern::BoardPattern(const SceneBoard& board)
     : warp_(board), mosaic_(make_rectangles(board)) {}
 
-std::optional<Eigen::Vector2d> BoardWarp::intersect_ray_with_parabola(
+std::optional<Eigen::Vector2d> BoardWarp::intersect_parabola(
     const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
   // With u = o + d t in half fields: z = warp (1 - u^2) at the distance t is a t^2 + b t + c = 0.
   const Eigen::Array2d o = origin.head<2>().array() * inverse_half_field_per_m_ - 1,
@@ -170,16 +170,16 @@ std::optional<Eigen::Vector2d> BoardWarp::intersect_ray_with_parabola(
   return origin.head<2>() + distance * direction.head<2>();
 }
 
-Eigen::Vector2d BoardPattern::intersect_ray_with_shape(const Eigen::Vector3d& origin,
-                                                       const Eigen::Vector3d& direction) const {
-  if (warp_.is_board_flat()) return intersect_ray_with_plane(origin, direction);
-  if (const auto met_m = warp_.intersect_ray_with_parabola(origin, direction)) return *met_m;
+Eigen::Vector2d BoardPattern::intersect(const Eigen::Vector3d& origin,
+                                        const Eigen::Vector3d& direction) const {
+  if (warp_.is_board_flat()) return intersect_plane(origin, direction);
+  if (const auto met_m = warp_.intersect_parabola(origin, direction)) return *met_m;
   // Beside the paper: Newton's method along the ray; converges in two or three steps.
-  Eigen::Vector2d at_m = intersect_ray_with_plane(origin, direction);
+  Eigen::Vector2d at_m = intersect_plane(origin, direction);
   constexpr double tolerance_m = 1e-9;
   double distance = -origin.z() / direction.z();
   for (int step = 0; step < 8; ++step) {
-    const auto [depth_m, slope] = warp_.compute_board_deflection(at_m);
+    const auto [depth_m, slope] = warp_.deflect(at_m);
     const double missed_m = origin.z() + distance * direction.z() - depth_m;
     if (!(std::abs(missed_m) > tolerance_m)) break;
     distance -= missed_m / (direction.z() - slope.dot(direction.head<2>()));

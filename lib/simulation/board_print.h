@@ -50,7 +50,7 @@ std::vector<Rectangle> make_board_pattern(const Board& board, const InkRadiances
 /// Returns the distance from the edge of the tag field (compute_tag_field_size_m()) to the
 /// outermost printed edge, m. Corner squares and the outer squares of chessboards extend beyond the
 /// field; otherwise 0.
-double compute_printed_margin_around_tags_m(const Board& board);
+double compute_printed_margin_m(const Board& board);
 
 /// Deflection of a warped board along z of the board frame (SceneBoard::warp_m).
 class BoardWarp {
@@ -63,11 +63,11 @@ class BoardWarp {
     Eigen::Vector2d slope;
   };
   /// Returns the deflection at a point (x, y) of the board, m.
-  Depth compute_board_deflection(const Eigen::Vector2d& at_m) const;
+  Depth deflect(const Eigen::Vector2d& at_m) const;
   /// Returns (x, y) of the intersection of a ray with the warped board, in the board frame;
   /// std::nullopt if it does not meet the board in its direction, or beside the paper.
-  std::optional<Eigen::Vector2d> intersect_ray_with_parabola(
-      const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
+  std::optional<Eigen::Vector2d> intersect_parabola(const Eigen::Vector3d& origin,
+                                                    const Eigen::Vector3d& direction) const;
   bool is_board_flat() const { return warp_m_.isZero(0); }
 
  private:
@@ -89,15 +89,12 @@ class BoardPattern {
 
   /// Returns (x, y) of the intersection of a ray with the board, in the board frame; NaN if there
   /// is none.
-  Eigen::Vector2d intersect_ray_with_shape(const Eigen::Vector3d& origin,
-                                           const Eigen::Vector3d& direction) const;
-  double compute_edge_contribution_to_area_integral(const Eigen::Vector2d& p,
-                                                    const Eigen::Vector2d& q) const {
-    return mosaic_.compute_edge_contribution_to_area_integral(p, q);
+  Eigen::Vector2d intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
+  double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+    return mosaic_.integrate_edge(p, q);
   }
-  std::optional<double> find_constant_value_in_quadrilateral(
-      const std::array<Eigen::Vector2d, 4>& corners) const {
-    return mosaic_.find_constant_value_in_quadrilateral(corners);
+  std::optional<double> find_uniform_value(const std::array<Eigen::Vector2d, 4>& corners) const {
+    return mosaic_.find_uniform_value(corners);
   }
 
  private:

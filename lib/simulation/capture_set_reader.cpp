@@ -53,7 +53,7 @@ struct PivotGrid {
   int columns, rows;
 };
 
-std::vector<Eigen::Vector2d> compute_grid_positions(const PivotGrid& grid) {
+std::vector<Eigen::Vector2d> list_grid_positions(const PivotGrid& grid) {
   const double step_x_m = grid.x_m[1] - grid.x_m[0], step_y_m = grid.y_m[1] - grid.y_m[0];
   std::vector<Eigen::Vector2d> pivots_m;
   for (int row = 0; row < grid.rows; ++row) {
@@ -65,8 +65,8 @@ std::vector<Eigen::Vector2d> compute_grid_positions(const PivotGrid& grid) {
   return pivots_m;
 }
 
-std::vector<Eigen::Vector2d> compute_positions_along(const StraightDrive& drive, double interval_s,
-                                                     const YamlField& value) {
+std::vector<Eigen::Vector2d> list_positions(const StraightDrive& drive, double interval_s,
+                                            const YamlField& value) {
   const Eigen::Vector2d displacement = drive.to_m - drive.from_m;
   const double step_m = drive.speed_m_per_s * interval_s;
   constexpr double rounding = 1e-12;
@@ -117,10 +117,10 @@ static void describe_positions(YamlMap& io, LampShots& captures, const PivotArea
   const YamlField drive = io.optional("drive", captures.drive, area);
   io.check(bool(pivots) + grid.has_value() + bool(drive) == 1,
            "needs one of the keys pivots_m, grid, drive, views");
-  if (grid) captures.pivots_m = compute_grid_positions(*grid);
+  if (grid) captures.pivots_m = list_grid_positions(*grid);
   if (drive) {
     drive.check(captures.drive->from_m != captures.drive->to_m, "has no length");
-    captures.pivots_m = compute_positions_along(*captures.drive, captures.interval_s, drive);
+    captures.pivots_m = list_positions(*captures.drive, captures.interval_s, drive);
   }
   pivots.check(!captures.pivots_m.empty(), "contains no pivot");
 }

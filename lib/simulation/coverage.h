@@ -22,8 +22,8 @@ using TargetFromCamera = std::function<Eigen::Isometry3d(int line)>;
 
 /// Returns the point (x, y) at which a ray meets the plane z = 0 of the target's frame, in the unit
 /// of `origin`. NaN if the ray does not meet the plane in its direction.
-inline Eigen::Vector2d intersect_ray_with_plane(const Eigen::Vector3d& origin,
-                                                const Eigen::Vector3d& direction) {
+inline Eigen::Vector2d intersect_plane(const Eigen::Vector3d& origin,
+                                       const Eigen::Vector3d& direction) {
   const double distance = -origin.z() / direction.z();
   if (!(distance > 0)) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   return origin.head<2>() + distance * direction.head<2>();
@@ -45,7 +45,7 @@ inline double cross_product_2d(const Eigen::Vector2d& a, const Eigen::Vector2d& 
 /// @pre the points vary smoothly over the block, also with the motion of the camera; the pattern is
 ///      0 at the horizon of its plane
 template <typename Shape>
-std::optional<double> find_constant_value_in_block(
+std::optional<double> find_uniform_value_in_block(
     const Shape& shape, const std::array<const Eigen::Vector2d*, 3>& rows) {
   Eigen::Array2d lower = rows[0][0].array(), upper = lower, sum(0, 0);
   int num_nan = 0;
@@ -64,9 +64,8 @@ std::optional<double> find_constant_value_in_block(
   if (!sum.isFinite().all()) return std::nullopt;
   const Eigen::Array2d margin = 2 * (along_row + along_column);
   const Eigen::Vector2d box_min = lower - margin, box_max = upper + margin;
-  return shape.find_constant_value_in_quadrilateral(
-      {box_min, Eigen::Vector2d(box_max.x(), box_min.y()), box_max,
-       Eigen::Vector2d(box_min.x(), box_max.y())});
+  return shape.find_uniform_value({box_min, Eigen::Vector2d(box_max.x(), box_min.y()), box_max,
+                                   Eigen::Vector2d(box_min.x(), box_max.y())});
 }
 
 /// Elements of a window, projected onto a target; see add_shape_to_image().
@@ -86,11 +85,11 @@ class ElementGrid {
   }
 
   /// Adds `weight` times the mean of the pattern to each element of `image`.
-  void add_pattern_to_image(double weight, cv::Mat1f& image) {
+  void add_pattern(double weight, cv::Mat1f& image) {
     for (int first_row = 0; first_row < size_.height; first_row += kBlockSize) {
       const int end_row = std::min(first_row + kBlockSize, size_.height);
       const std::vector<cv::Range> varying_columns =
-          end_row - first_row == kBlockSize ? add_constant_blocks(first_row, weight, image)
+          end_row - first_row == kBlockSize ? fill_uniform_blocks(first_row, weight, image)
                                             : std::vector<cv::Range>{{0, size_.width}};
       for (int row = first_row; row < end_row; ++row) {
         // Rows seen from one pose share their corners: all rows unless camera or target moves.
@@ -130,8 +129,8 @@ class ElementGrid {
   /// Returns the point of the target on the ray through a corner of elements, for the camera pose
   /// of `row`.
   Eigen::Vector2d intersect_corner(int row, int corner_row, int corner_column) const {
-    return shape_.intersect_ray_with_shape(
-        pose(row).translation(), pose(row).linear() * corner_ray(corner_row, corner_column));
+    return shape_.intersect(pose(row).translation(),
+                            pose(row).linear() * corner_ray(corner_row, corner_column));
   }
 
   /// Computes the points of the target at the corners of a range of columns, for the camera pose of
@@ -147,7 +146,7 @@ class ElementGrid {
 
   /// Fills the blocks below `first_row` over which the pattern is constant. Returns the columns in
   /// which it varies.
-  std::vector<cv::Range> add_constant_blocks(int first_row, double weight, cv::Mat1f& image) const {
+  std::vector<cv::Range> fill_uniform_blocks(int first_row, double weight, cv::Mat1f& image) const {
     const int num_blocks = size_.width / kBlockSize;
     std::array<std::vector<Eigen::Vector2d>, 3> points;
     for (int i = 0; i < 3; ++i) {
@@ -170,7 +169,7 @@ class ElementGrid {
     for (int block = 0; block < num_blocks; ++block) {
       const int column = block * kBlockSize;
       const auto block_points = [&](std::size_t i) { return points[i].data() + 2 * block; };
-      if (const auto value = find_constant_value_in_block(
+      if (const auto value = find_uniform_value_in_block(
               shape_, {block_points(0), block_points(1), block_points(2)})) {
         image(cv::Rect(column, first_row, kBlockSize, kBlockSize)) += weight * *value;
       } else {
@@ -184,7 +183,7 @@ class ElementGrid {
   /// Returns the contributions of an edge to the integral of the pattern and to the area, by
   /// Green's theorem.
   Edge integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
-    return {shape_.compute_edge_contribution_to_area_integral(p, q), cross_product_2d(p, q) / 2};
+    return {shape_.integrate_edge(p, q), cross_product_2d(p, q) / 2};
   }
 
   /// Adds the pattern to elements of a row, whose corners are in above_ and below_.
@@ -193,8 +192,8 @@ class ElementGrid {
     bool is_left_known = false;
     for (int column = columns.start; column < columns.end; ++column) {
       const auto i = static_cast<std::size_t>(column);
-      if (const auto value = shape_.find_constant_value_in_quadrilateral(
-              {above_[i], above_[i + 1], below_[i + 1], below_[i]})) {
+      if (const auto value =
+              shape_.find_uniform_value({above_[i], above_[i + 1], below_[i + 1], below_[i]})) {
         row[i] += static_cast<float>(weight * *value);
         is_left_known = false;
         continue;
@@ -226,7 +225,7 @@ class ElementGrid {
 /// pattern g over the element: a pixel or, with `per_px` 2, a quarter of one.
 ///
 /// The mean is exact for the element's image on the pattern, a quadrilateral Q. By Green's theorem
-/// the integral of g over Q is the sum of shape.compute_edge_contribution_to_area_integral(p, q)
+/// the integral of g over Q is the sum of shape.integrate_edge(p, q)
 /// over its edges. An edge integral is the integral along the edge of any G(x, y) that Green's
 /// theorem turns into g.
 ///
@@ -234,9 +233,9 @@ class ElementGrid {
 /// means instead would displace an edge by 0.01 px. Rays within a pixel are interpolated linearly
 /// between those of its corners.
 ///
-/// A shape has intersect_ray_with_shape(origin, direction) in its frame and
-/// compute_edge_contribution_to_area_integral(p, q). Its
-/// find_constant_value_in_quadrilateral(corners) returns the value of the pattern if it is constant
+/// A shape has intersect(origin, direction) in its frame and
+/// integrate_edge(p, q). Its
+/// find_uniform_value(corners) returns the value of the pattern if it is constant
 /// over the quadrilateral, which may be larger than an element; otherwise std::nullopt. Blocks of
 /// 16 x 16 elements with a constant value are filled at once.
 template <typename Shape>
@@ -244,7 +243,7 @@ void add_shape_to_image(const PixelRays& rays, const PixelWindow& window,
                         const TargetFromCamera& target_from_camera, const Shape& shape,
                         double weight, cv::Mat1f& image, int per_px = 1) {
   ElementGrid(rays, window, target_from_camera, shape, per_px, image.size())
-      .add_pattern_to_image(weight, image);
+      .add_pattern(weight, image);
 }
 
 }  // namespace vlp

@@ -56,9 +56,8 @@ double compute_halo_fraction(const Halo& halo, double radius_m, const Eigen::Vec
 
 }  // namespace
 
-double compute_downlight_relative_radiance(const Recess& recess, double radius_m,
-                                           const Eigen::Vector3d& eye_m,
-                                           const Eigen::Vector2d& at_m) {
+double compute_relative_radiance(const Recess& recess, double radius_m,
+                                 const Eigen::Vector3d& eye_m, const Eigen::Vector2d& at_m) {
   if (eye_m.z() >= 0) return 0;
   const Eigen::Vector2d slope = (at_m - eye_m.head<2>()) / -eye_m.z();
   double wall = compute_wall_fraction(recess, radius_m, at_m);
@@ -74,15 +73,14 @@ double compute_downlight_relative_radiance(const Recess& recess, double radius_m
   return wall + (1 - wall) * source;
 }
 
-double compute_light_source_radius_m(const Glow& glow) {
+double compute_source_radius_m(const Glow& glow) {
   return glow.glow_radius_m() + (glow.halo ? kHaloLengths * glow.halo->length_m : 0);
 }
 
-void add_downlight_to_image(const PixelRays& rays, const PixelWindow& window,
-                            const TargetFromCamera& glow_from_camera, const Glow& glow,
-                            cv::Mat1f& image) {
+void add_downlight(const PixelRays& rays, const PixelWindow& window,
+                   const TargetFromCamera& glow_from_camera, const Glow& glow, cv::Mat1f& image) {
   const double radius_m = glow.glow_radius_m();
-  cv::Mat1f inside = window.make_constant_window_image(0);
+  cv::Mat1f inside = window.make_constant_image(0);
   add_shape_to_image(rays, window, glow_from_camera, Disc(*glow.shape.size_m / 2, 1), 1, inside);
   if (!glow.recess) {
     add_shape_to_image(rays, window, glow_from_camera,
@@ -93,7 +91,7 @@ void add_downlight_to_image(const PixelRays& rays, const PixelWindow& window,
     const Eigen::Isometry3d pose = glow_from_camera(line);
     const Eigen::Vector3d eye_m = pose.translation();
     const auto hit = [&](int at_line, int place) {
-      return intersect_ray_with_plane(eye_m, pose.linear() * rays.pixel_corner_ray(at_line, place));
+      return intersect_plane(eye_m, pose.linear() * rays.pixel_corner_ray(at_line, place));
     };
     for (int place = window.place_begin; place < window.place_end; ++place) {
       const int row = line - window.line_begin, column = place - window.place_begin;
@@ -105,7 +103,7 @@ void add_downlight_to_image(const PixelRays& rays, const PixelWindow& window,
       if (!at_m.allFinite()) continue;
       double fraction = 0;
       if (glow.recess)
-        fraction += part * compute_downlight_relative_radiance(*glow.recess, radius_m, eye_m, at_m);
+        fraction += part * compute_relative_radiance(*glow.recess, radius_m, eye_m, at_m);
       if (glow.chips) fraction += part * compute_chip_fraction(*glow.chips, radius_m, at_m);
       fraction += part * compute_hot_spot_fraction(glow.hot_spots, at_m);
       if (glow.halo && eye_m.z() < 0)

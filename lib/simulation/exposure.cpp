@@ -48,27 +48,26 @@ void add_blooming(const Bloom& bloom, float full_well_e, cv::Mat1f& electrons) {
 void apply_filters(const Bayer& bayer, cv::Mat1f& electrons) {
   for (int line = 0; line < electrons.rows; ++line) {
     for (int place = 0; place < electrons.cols; ++place) {
-      electrons(line, place) *= static_cast<float>(bayer_filter_transmission(bayer, line, place));
+      electrons(line, place) *= static_cast<float>(bayer_transmission(bayer, line, place));
     }
   }
 }
 
 }  // namespace
 
-double sensor_white_level_dn(const Sensor& sensor) { return sensor.bits == 8 ? 255 : 65535; }
+double white_level_dn(const Sensor& sensor) { return sensor.bits == 8 ? 255 : 65535; }
 
-int bayer_color_index_at(int line, int place) {
+int bayer_color_at(int line, int place) {
   const auto parity = [](int i) { return ((i % 2) + 2) % 2; };
   return 2 - parity(line) - parity(place);
 }
 
-double bayer_filter_transmission(const Bayer& bayer, int line, int place) {
+double bayer_transmission(const Bayer& bayer, int line, int place) {
   const std::array transmissions{bayer.blue_to_green_ratio, 1.0, bayer.red_to_green_ratio};
-  return transmissions[static_cast<std::size_t>(bayer_color_index_at(line, place))];
+  return transmissions[static_cast<std::size_t>(bayer_color_at(line, place))];
 }
 
-std::vector<cv::Mat1f> demosaic_bayer_image(const Bayer& bayer, const Sensor& sensor,
-                                            const cv::Mat1f& levels) {
+std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const cv::Mat1f& levels) {
   // The weights over the 3 x 3 neighborhood add up to 1 over the pixels that have the color.
   const cv::Matx33f corners(.25F, .5F, .25F, .5F, 1, .5F, .25F, .5F, .25F);
   const cv::Matx33f sides(0, .25F, 0, .25F, 1, .25F, 0, .25F, 0);
@@ -79,7 +78,7 @@ std::vector<cv::Mat1f> demosaic_bayer_image(const Bayer& bayer, const Sensor& se
     cv::Mat1f channel(levels.size(), 0);
     for (int line = 0; line < levels.rows; ++line) {
       for (int place = 0; place < levels.cols; ++place) {
-        if (bayer_color_index_at(line, place) == color)
+        if (bayer_color_at(line, place) == color)
           channel(line, place) = levels(line, place) - black;
       }
     }
@@ -92,17 +91,15 @@ std::vector<cv::Mat1f> demosaic_bayer_image(const Bayer& bayer, const Sensor& se
   return colors;
 }
 
-double apply_tone_curve_to_gray_level(const ImageProcessing& processing, const Sensor& sensor,
-                                      double level_dn) {
-  const double black = sensor.black_level_dn, white = sensor_white_level_dn(sensor);
+double apply_tone_curve(const ImageProcessing& processing, const Sensor& sensor, double level_dn) {
+  const double black = sensor.black_level_dn, white = white_level_dn(sensor);
   const double fraction = std::clamp((level_dn - black) / (white - black), 0.0, 1.0);
   return white * std::pow(fraction, 1 / processing.gamma);
 }
 
-void apply_tone_curve_and_sharpening(const ImageProcessing& processing, const Sensor& sensor,
-                                     cv::Mat1f& levels) {
+void process_levels(const ImageProcessing& processing, const Sensor& sensor, cv::Mat1f& levels) {
   for (float& level : levels) {
-    level = static_cast<float>(apply_tone_curve_to_gray_level(processing, sensor, double(level)));
+    level = static_cast<float>(apply_tone_curve(processing, sensor, double(level)));
   }
   if (!processing.sharpening) return;
   const auto [amount, radius_px] = *processing.sharpening;
@@ -111,12 +108,12 @@ void apply_tone_curve_and_sharpening(const ImageProcessing& processing, const Se
   levels += amount * (levels - soft);
 }
 
-std::string image_file_extension(const std::optional<ImageProcessing>& processing) {
+std::string image_extension(const std::optional<ImageProcessing>& processing) {
   return processing && processing->jpeg_quality ? ".jpg" : ".png";
 }
 
-std::vector<unsigned char> encode_image_as_jpeg_or_png(
-    const cv::Mat& image, const std::optional<ImageProcessing>& processing) {
+std::vector<unsigned char> encode_image(const cv::Mat& image,
+                                        const std::optional<ImageProcessing>& processing) {
   const std::string bytes =
       processing && processing->jpeg_quality
           ? get_codecs().encode_image_file(".jpg", image,
@@ -151,15 +148,15 @@ cv::Mat simulate_sensor_image(const Sensor& sensor, const cv::Mat1f& mean_electr
   cv::Mat1f levels;
   electrons.convertTo(levels, CV_32F, sensor.gain_dn_per_e, sensor.black_level_dn);
   if (!processing->bayer) {
-    apply_tone_curve_and_sharpening(*processing, sensor, levels);
+    process_levels(*processing, sensor, levels);
     levels.convertTo(image, type);
     return image;
   }
   // The analog-to-digital converter rounds before demosaicing.
   for (float& level : levels)
-    level = std::clamp(std::round(level), 0.F, float(sensor_white_level_dn(sensor)));
-  auto colors = demosaic_bayer_image(*processing->bayer, sensor, levels);
-  for (cv::Mat1f& color : colors) apply_tone_curve_and_sharpening(*processing, sensor, color);
+    level = std::clamp(std::round(level), 0.F, float(white_level_dn(sensor)));
+  auto colors = demosaic(*processing->bayer, sensor, levels);
+  for (cv::Mat1f& color : colors) process_levels(*processing, sensor, color);
   cv::Mat color_image;
   cv::merge(colors, color_image);
   color_image.convertTo(image, type);

@@ -13,34 +13,31 @@
 namespace vlp {
 
 /// Returns the white level of the sensor, 255 or 65535.
-double sensor_white_level_dn(const Sensor& sensor);
+double white_level_dn(const Sensor& sensor);
 
 /// Returns the color of a pixel's Bayer filter (RGGB): 0 blue, 1 green, 2 red, the channel order of
 /// OpenCV. The pixel is in readout order (line, place), both from 0 and possibly negative.
-int bayer_color_index_at(int line, int place);
+int bayer_color_at(int line, int place);
 
 /// Returns the fraction of a pixel's light that its filter passes, relative to green.
-double bayer_filter_transmission(const Bayer& bayer, int line, int place);
+double bayer_transmission(const Bayer& bayer, int line, int place);
 
 /// Demosaics the gray levels behind a mosaic of filters and balances the three colors.
-std::vector<cv::Mat1f> demosaic_bayer_image(const Bayer& bayer, const Sensor& sensor,
-                                            const cv::Mat1f& levels);
+std::vector<cv::Mat1f> demosaic(const Bayer& bayer, const Sensor& sensor, const cv::Mat1f& levels);
 
 /// Applies the tone curve of ImageProcessing to one gray level, DN.
-double apply_tone_curve_to_gray_level(const ImageProcessing& processing, const Sensor& sensor,
-                                      double level_dn);
+double apply_tone_curve(const ImageProcessing& processing, const Sensor& sensor, double level_dn);
 
 /// Applies tone curve and sharpening of ImageProcessing to gray levels before rounding. Border
 /// pixels are replicated.
-void apply_tone_curve_and_sharpening(const ImageProcessing& processing, const Sensor& sensor,
-                                     cv::Mat1f& levels);
+void process_levels(const ImageProcessing& processing, const Sensor& sensor, cv::Mat1f& levels);
 
 /// Returns the file name extension of the images: ".jpg" or ".png".
-std::string image_file_extension(const std::optional<ImageProcessing>& processing);
+std::string image_extension(const std::optional<ImageProcessing>& processing);
 
 /// Encodes the image as JPEG, or losslessly as PNG.
-std::vector<unsigned char> encode_image_as_jpeg_or_png(
-    const cv::Mat& image, const std::optional<ImageProcessing>& processing);
+std::vector<unsigned char> encode_image(const cv::Mat& image,
+                                        const std::optional<ImageProcessing>& processing);
 
 /// Simulates a sensor (see Sensor) from the mean number of electrons of each pixel.
 ///

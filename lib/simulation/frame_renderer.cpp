@@ -47,12 +47,12 @@ FrameRenderer::FrameRenderer(const Scene& scene)
       rays_(scene.camera, compute_blur_radius_px(scene.optics)),
       optics_(scene.optics, rays_),
       transmission_(compute_vignetting(rays_, scene.optics.vignetting_power)) {
-  transmission_ = transmission_.mul(compute_dust_transmission(scene.optics.dust, rays_));
+  transmission_ = transmission_.mul(compute_transmission(scene.optics.dust, rays_));
   if (scene.board) pattern_.emplace(*scene.board);
 }
 
-cv::Mat1f FrameRenderer::integrate_electrons_over_exposure(const cv::Mat1f& electrons_per_s,
-                                                           double exposure_s) const {
+cv::Mat1f FrameRenderer::integrate_electrons(const cv::Mat1f& electrons_per_s,
+                                             double exposure_s) const {
   return cv::Mat1f(rays_.crop_image_margin(electrons_per_s).mul(transmission_, exposure_s));
 }
 
@@ -132,17 +132,15 @@ class LampFrame {
         shot_(shot),
         motion_(shot.motion),
         part_(part) {
-    if (!scene.clutter.occluders.empty() || mirror)
-      transmittance_ = rays_.make_constant_image_with_margin(1);
+    if (!scene.clutter.occluders.empty() || mirror) transmittance_ = rays_.make_padded_image(1);
     for (const Panel& occluder : scene.clutter.occluders) {
-      transmittance_ = transmittance_.mul(1 - compute_shape_coverage(occluder));
+      transmittance_ = transmittance_.mul(1 - render_coverage(occluder));
     }
     if (!mirror) return;
-    transmittance_ = transmittance_.mul(mirror->reflectance * compute_shape_coverage(mirror->pane));
-    pane_window_ = compute_window_of_moving_object(compute_object_outline_points(mirror->pane),
-                                                   motion_, part_, rays_);
+    transmittance_ = transmittance_.mul(mirror->reflectance * render_coverage(mirror->pane));
+    pane_window_ = compute_moving_window(list_outline_points(mirror->pane), motion_, part_, rays_);
     mirror_ = mirror;
-    reflection_ = make_reflection_about_panel(mirror->pane);
+    reflection_ = make_reflection(mirror->pane);
   }
 
   /// Returns the light of all sources that are always on.
@@ -154,23 +152,22 @@ class LampFrame {
       return image;
     }
     for (const Panel& window : clutter.windows) {
-      replace_ceiling_by_panel(window, make_panel_mosaic(window), image);
+      replace_ceiling(window, make_panel_mosaic(window), image);
     }
     for (const Blind& blind : clutter.blinds) {
-      replace_ceiling_by_panel(blind.window,
-                               make_panel_mosaic(blind.window, make_window_bars(blind)), image);
+      replace_ceiling(blind.window, make_panel_mosaic(blind.window, make_window_bars(blind)),
+                      image);
     }
     for (const Sign& sign : clutter.signs) {
-      replace_ceiling_by_panel(sign.panel, make_panel_mosaic(sign.panel, sign.strokes), image);
+      replace_ceiling(sign.panel, make_panel_mosaic(sign.panel, sign.strokes), image);
     }
     for (const Glow& lamp : clutter.steady_lamps) {
       const PixelWindow window = compute_light_window(lamp);
       if (!window.is_empty_window())
-        render_light_into_window(lamp, window,
-                                 window.crop_image_to_window(image, rays_.image_margin_px()));
+        render_light(lamp, window, window.crop(image, rays_.image_margin_px()));
     }
     for (const Panel& occluder : clutter.occluders) {
-      const cv::Mat1f hidden = compute_shape_coverage(occluder);
+      const cv::Mat1f hidden = render_coverage(occluder);
       image = image.mul(1 - hidden) + occluder.electron_rate_e_per_s * hidden;
     }
     optics_.apply_point_spread(image, {-rays_.image_margin_px(), -rays_.image_margin_px()});
@@ -181,23 +178,22 @@ class LampFrame {
   /// Adds a switched light. In a mirror: only lights on the camera's side of its plane.
   void add(const Source& source, cv::Mat1f& image) const {
     const Eigen::Vector3d eye_m = motion_.world_from_camera(0).translation();
-    if (mirror_ && !are_on_same_side_of_mirror(*mirror_, source.glow.position_m, eye_m)) return;
+    if (mirror_ && !are_on_same_side(*mirror_, source.glow.position_m, eye_m)) return;
     const PixelWindow window = compute_light_window(source.glow);
     if (window.is_empty_window()) return;
-    cv::Mat1f patch = window.make_constant_window_image(0);
-    render_light_into_window(source.glow, window, patch);
+    cv::Mat1f patch = window.make_constant_image(0);
+    render_light(source.glow, window, patch);
     if (!transmittance_.empty())
-      patch = patch.mul(window.crop_image_to_window(transmittance_, rays_.image_margin_px()));
+      patch = patch.mul(window.crop(transmittance_, rays_.image_margin_px()));
     optics_.apply_point_spread(patch, {window.line_begin, window.place_begin});
     // Light that a veil scatters to all pixels.
-    if (const float scattered_e_per_s = optics_.extract_veiling_glare_per_pixel(patch);
-        scattered_e_per_s != 0) {
+    if (const float scattered_e_per_s = optics_.extract_glare(patch); scattered_e_per_s != 0) {
       for (int row = 0; row < image.rows; ++row) {
         image.row(row) += compute_mean_light_fraction(source.wave, row - rays_.image_margin_px()) *
                           scattered_e_per_s;
       }
     }
-    cv::Mat1f target = window.crop_image_to_window(image, rays_.image_margin_px());
+    cv::Mat1f target = window.crop(image, rays_.image_margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
       target.row(row) += compute_mean_light_fraction(source.wave, line) * patch.row(row);
@@ -208,8 +204,8 @@ class LampFrame {
   double compute_mean_light_fraction(const LightWave& wave, int line) const {
     return std::visit(
         [&](const auto& each) {
-          return each.compute_mean_light_fraction(part_.exposure_sample_begin_s(line),
-                                                  part_.exposure_sample_end_s(line));
+          return each.compute_mean_light_fraction(part_.sample_begin_s(line),
+                                                  part_.sample_end_s(line));
         },
         wave);
   }
@@ -223,7 +219,7 @@ class LampFrame {
   }
 
   cv::Mat1f render_ceiling() const {
-    cv::Mat1f image = rays_.make_constant_image_with_margin(0);
+    cv::Mat1f image = rays_.make_padded_image(0);
     for (int row = 0; row < image.rows; ++row) {
       image.row(row) = static_cast<float>(compute_ceiling_radiance(row - rays_.image_margin_px()));
     }
@@ -231,15 +227,15 @@ class LampFrame {
   }
 
   /// Replaces the radiance of the ceiling by that of a panel where the pattern is 1.
-  void replace_ceiling_by_panel(const Panel& panel, const RectanglePattern& pattern,
-                                cv::Mat1f& image) const {
-    const PixelWindow window = compute_window_of_moving_object(compute_object_outline_points(panel),
-                                                               motion_, part_, rays_);
+  void replace_ceiling(const Panel& panel, const RectanglePattern& pattern,
+                       cv::Mat1f& image) const {
+    const PixelWindow window =
+        compute_moving_window(list_outline_points(panel), motion_, part_, rays_);
     if (window.is_empty_window()) return;
-    cv::Mat1f cover = window.make_constant_window_image(0);
+    cv::Mat1f cover = window.make_constant_image(0);
     add_shape_to_image(rays_, window, compute_target_from_camera(compute_panel_from_world(panel)),
                        pattern, 1, cover);
-    cv::Mat1f target = window.crop_image_to_window(image, rays_.image_margin_px());
+    cv::Mat1f target = window.crop(image, rays_.image_margin_px());
     for (int line = window.line_begin; line < window.line_end; ++line) {
       const int row = line - window.line_begin;
       target.row(row) +=
@@ -247,37 +243,34 @@ class LampFrame {
     }
   }
   /// Returns the fraction of each pixel that a panel covers.
-  cv::Mat1f compute_shape_coverage(const Panel& panel) const {
-    cv::Mat1f covered = rays_.make_constant_image_with_margin(0);
-    const PixelWindow window = compute_window_of_moving_object(compute_object_outline_points(panel),
-                                                               motion_, part_, rays_);
+  cv::Mat1f render_coverage(const Panel& panel) const {
+    cv::Mat1f covered = rays_.make_padded_image(0);
+    const PixelWindow window =
+        compute_moving_window(list_outline_points(panel), motion_, part_, rays_);
     if (!window.is_empty_window())
-      render_light_into_window(panel, 1, window,
-                               window.crop_image_to_window(covered, rays_.image_margin_px()));
+      render_light(panel, 1, window, window.crop(covered, rays_.image_margin_px()));
     return covered;
   }
   PixelWindow compute_light_window(const Glow& glow) const {
-    auto outline_m = compute_object_outline_points(glow);
-    if (!mirror_) return compute_window_of_moving_object(outline_m, motion_, part_, rays_);
+    auto outline_m = list_outline_points(glow);
+    if (!mirror_) return compute_moving_window(outline_m, motion_, part_, rays_);
     for (Eigen::Vector3d& point_m : outline_m) point_m = reflection_ * point_m;
-    return intersect_pixel_windows(
-        compute_window_of_moving_object(outline_m, motion_, part_, rays_), pane_window_);
+    return intersect_windows(compute_moving_window(outline_m, motion_, part_, rays_), pane_window_);
   }
   /// Returns the pose of the camera in a target's frame; for a mirror, of the reflected camera.
   TargetFromCamera compute_target_from_camera(const Eigen::Isometry3d& target_from_world) const {
     return [this, target_from_rays = target_from_world * reflection_](int line) {
-      return target_from_rays * motion_.world_from_camera(part_.exposure_part_middle_s(line));
+      return target_from_rays * motion_.world_from_camera(part_.part_middle_s(line));
     };
   }
   /// Draws a glow. `target` is the window's part of an image.
-  void render_light_into_window(const Glow& glow, const PixelWindow& window,
-                                cv::Mat1f target) const {
+  void render_light(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
     if (!get_lamp_shape_traits(glow.shape.kind).is_round) {
-      const Panel panel = make_panel_around_glow(glow);
+      const Panel panel = make_panel(glow);
       if (glow.rim_to_center_ratio == 1)
-        return render_light_into_window(panel, glow.electron_rate_e_per_s, window, target);
-      cv::Mat1f patch = window.make_constant_window_image(0);
-      render_light_into_window(panel, glow.electron_rate_e_per_s, window, patch);
+        return render_light(panel, glow.electron_rate_e_per_s, window, target);
+      cv::Mat1f patch = window.make_constant_image(0);
+      render_light(panel, glow.electron_rate_e_per_s, window, patch);
       apply_panel_falloff(panel, glow.rim_to_center_ratio, window, patch);
       target += patch;
       return;
@@ -287,7 +280,7 @@ class LampFrame {
         Eigen::AngleAxisd(glow.shape.yaw_rad, Eigen::Vector3d::UnitZ());
     const TargetFromCamera glow_from_camera = compute_target_from_camera(world_from_glow.inverse());
     if (glow.recess || glow.chips || !glow.hot_spots.empty() || glow.halo) {
-      add_downlight_to_image(rays_, window, glow_from_camera, glow, target);
+      add_downlight(rays_, window, glow_from_camera, glow, target);
       return;
     }
     add_shape_to_image(rays_, window, glow_from_camera,
@@ -307,8 +300,7 @@ class LampFrame {
         if (value == 0) continue;
         const Eigen::Vector3d middle =
             rays_.pixel_corner_ray(line, place) + rays_.pixel_corner_ray(line + 1, place + 1);
-        const Eigen::Vector2d at_m =
-            intersect_ray_with_plane(pose.translation(), pose.linear() * middle);
+        const Eigen::Vector2d at_m = intersect_plane(pose.translation(), pose.linear() * middle);
         const Eigen::Array2d off = 2 * at_m.array() / size_m - 1;
         const Eigen::Array2d left = (1 - (1 - rim_to_center_ratio) * off.square()).max(0);
         value *= static_cast<float>(left.prod());
@@ -316,8 +308,8 @@ class LampFrame {
     }
   }
   /// Draws a panel. `target` is the window's part of an image.
-  void render_light_into_window(const Panel& panel, double value, const PixelWindow& window,
-                                cv::Mat1f target) const {
+  void render_light(const Panel& panel, double value, const PixelWindow& window,
+                    cv::Mat1f target) const {
     add_shape_to_image(rays_, window, compute_target_from_camera(compute_panel_from_world(panel)),
                        make_panel_mosaic(panel), value, target);
   }
@@ -336,11 +328,11 @@ class LampFrame {
   Eigen::Isometry3d reflection_ = Eigen::Isometry3d::Identity();
 };
 
-/// Returns points on the outlines of everything in view, for compute_max_image_motion_px().
+/// Returns points on the outlines of everything in view, for compute_max_motion_px().
 std::vector<Eigen::Vector3d> collect_outlines(const Scene& scene) {
   std::vector<Eigen::Vector3d> points_m;
   const auto add = [&](const auto& thing) {
-    const auto outline_m = compute_object_outline_points(thing);
+    const auto outline_m = list_outline_points(thing);
     points_m.insert(points_m.end(), outline_m.begin(), outline_m.end());
   };
   for (const SceneLamp& lamp : scene.lamps) add(lamp.glow);
@@ -357,16 +349,16 @@ std::vector<Eigen::Vector3d> collect_outlines(const Scene& scene) {
 
 }  // namespace
 
-cv::Mat1f FrameRenderer::render_lamps_in_electrons(const LampShot& shot) const {
+cv::Mat1f FrameRenderer::render_lamps(const LampShot& shot) const {
   Shutter part = make_rolling_shutter(shot.exposure_s);
   if (!shot.motion.is_base_at_rest()) {
     const auto pose = [&](double time_s) {
       return shot.motion.world_from_camera(time_s).inverse();
     };
-    part.count = count_exposure_time_samples(
-        compute_max_image_motion_px(collect_outlines(scene_), pose, shot.exposure_s, rays_));
+    part.count = count_time_samples(
+        compute_max_motion_px(collect_outlines(scene_), pose, shot.exposure_s, rays_));
   }
-  cv::Mat1f sum = rays_.make_constant_image_with_margin(0);
+  cv::Mat1f sum = rays_.make_padded_image(0);
   for (; part.index < part.count; ++part.index) {
     const LampFrame frame(scene_, rays_, optics_, shot, part);
     sum += frame.render_steady_light();
@@ -376,16 +368,16 @@ cv::Mat1f FrameRenderer::render_lamps_in_electrons(const LampShot& shot) const {
       for (const Source& source : list_sources(scene_, shot, true)) mirrored.add(source, sum);
     }
   }
-  return integrate_electrons_over_exposure(sum, shot.exposure_s / part.count);
+  return integrate_electrons(sum, shot.exposure_s / part.count);
 }
 
 namespace {
 
-/// Returns points all over the board, for compute_max_image_motion_px().
+/// Returns points all over the board, for compute_max_motion_px().
 std::vector<Eigen::Vector3d> sample_surface_points(const Board& board) {
   std::vector<Eigen::Vector3d> points_m;
-  if (board.has_chessboard_squares()) {
-    for (const Eigen::Vector2d& at_m : list_chessboard_corners_m(board)) {
+  if (board.has_squares()) {
+    for (const Eigen::Vector2d& at_m : list_inner_corners_m(board)) {
       points_m.emplace_back(at_m.x(), at_m.y(), 0);
     }
     return points_m;
@@ -399,27 +391,27 @@ std::vector<Eigen::Vector3d> sample_surface_points(const Board& board) {
 
 }  // namespace
 
-cv::Mat1f FrameRenderer::render_board_in_electrons(const BoardShot& shot) const {
+cv::Mat1f FrameRenderer::render_board(const BoardShot& shot) const {
   Shutter part = make_rolling_shutter(shot.exposure_s);
   if (!shot.velocity_in_camera_m_per_s.isZero(0)) {
     const auto pose = [&](double time_s) { return shot.camera_from_board(time_s); };
-    part.count = count_exposure_time_samples(compute_max_image_motion_px(
+    part.count = count_time_samples(compute_max_motion_px(
         sample_surface_points(scene_.board->pattern), pose, shot.exposure_s, rays_));
   }
   const auto surround = static_cast<float>(scene_.board->surround_e_per_s);
-  const cv::Size pixels = rays_.make_constant_image_with_margin(0).size();
+  const cv::Size pixels = rays_.make_padded_image(0).size();
   cv::Mat1f supersampled(2 * pixels.height, 2 * pixels.width, surround), image;
   for (; part.index < part.count; ++part.index) {
     const auto board_from_camera = [&](int line) {
-      return shot.camera_from_board(part.exposure_part_middle_s(line)).inverse();
+      return shot.camera_from_board(part.part_middle_s(line)).inverse();
     };
-    add_shape_to_image(rays_, make_full_image_window(rays_), board_from_camera, *pattern_,
+    add_shape_to_image(rays_, make_full_window(rays_), board_from_camera, *pattern_,
                        1.0 / part.count, supersampled, 2);
   }
   optics_.apply_point_spread(supersampled, {-rays_.image_margin_px(), -rays_.image_margin_px(), 2});
   cv::resize(supersampled, image, pixels, 0, 0, cv::INTER_AREA);
   optics_.add_veiling_glare(image);
-  return integrate_electrons_over_exposure(image, shot.exposure_s);
+  return integrate_electrons(image, shot.exposure_s);
 }
 
 }  // namespace vlp

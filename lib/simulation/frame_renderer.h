@@ -14,7 +14,7 @@ namespace vlp {
 
 /// Renders the light that a scene's camera collects: the mean number of electrons of each pixel.
 /// - A pixel integrates over its area (add_shape_to_image()) and over its exposure. Line i is
-///   exposed around Shutter::line_exposure_center_s(i), from the pose of the camera at that time.
+///   exposed around Shutter::line_center_s(i), from the pose of the camera at that time.
 ///   Exposures during which something in view moves by more than 0.1 px are sums of several shorter
 ///   ones.
 /// - A board is blurred at twice the resolution, before pixels integrate (add_shape_to_image()).
@@ -31,8 +31,8 @@ class FrameRenderer {
   explicit FrameRenderer(const Scene& scene);
 
   /// Returns electrons per pixel, as lines x places (PixelRays).
-  cv::Mat1f render_lamps_in_electrons(const LampShot& shot) const;
-  cv::Mat1f render_board_in_electrons(const BoardShot& shot) const;
+  cv::Mat1f render_lamps(const LampShot& shot) const;
+  cv::Mat1f render_board(const BoardShot& shot) const;
 
   const PixelRays& pixel_rays() const { return rays_; }
   Shutter make_rolling_shutter(double exposure_s) const {
@@ -40,8 +40,7 @@ class FrameRenderer {
   }
 
  private:
-  cv::Mat1f integrate_electrons_over_exposure(const cv::Mat1f& electrons_per_s,
-                                              double exposure_s) const;
+  cv::Mat1f integrate_electrons(const cv::Mat1f& electrons_per_s, double exposure_s) const;
 
   const Scene& scene_;
   PixelRays rays_;

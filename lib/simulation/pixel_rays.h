@@ -38,12 +38,12 @@ class PixelRays {
   }
 
   /// Returns (line, place) of a pixel (u, v), which need not be integer.
-  Eigen::Vector2d convert_pixel_to_readout_order(const Eigen::Vector2d& pixel) const {
+  Eigen::Vector2d to_readout_order(const Eigen::Vector2d& pixel) const {
     return readout_ == Readout::rows ? Eigen::Vector2d(pixel.y(), pixel.x()) : pixel;
   }
 
   /// Returns a constant image of lines x places with the margin all around.
-  cv::Mat1f make_constant_image_with_margin(float value) const {
+  cv::Mat1f make_padded_image(float value) const {
     return cv::Mat1f(lines_ + 2 * margin_px_, places_ + 2 * margin_px_, value);
   }
   /// Returns the part of an image with margin that is inside the margin.

@@ -11,17 +11,16 @@
 
 namespace vlp {
 
-PixelWindow make_full_image_window(const PixelRays& rays) {
+PixelWindow make_full_window(const PixelRays& rays) {
   const int margin = rays.image_margin_px();
   return {-margin, rays.num_readout_lines() + margin, -margin, rays.pixels_per_line() + margin};
 }
 
-PixelWindow compute_window_of_moving_object(const std::vector<Eigen::Vector3d>& outline_m,
-                                            const BaseMotion& motion, const Shutter& shutter,
-                                            const PixelRays& rays) {
-  const double begin_s = shutter.exposure_sample_begin_s(-rays.image_margin_px());
-  const double end_s =
-      shutter.exposure_sample_end_s(rays.num_readout_lines() + rays.image_margin_px());
+PixelWindow compute_moving_window(const std::vector<Eigen::Vector3d>& outline_m,
+                                  const BaseMotion& motion, const Shutter& shutter,
+                                  const PixelRays& rays) {
+  const double begin_s = shutter.sample_begin_s(-rays.image_margin_px());
+  const double end_s = shutter.sample_end_s(rays.num_readout_lines() + rays.image_margin_px());
   // Between two samples an arc of 450 px deviates from its chord by less than 0.1 px.
   const double step_rad = rad_from_deg(2);
   constexpr double samples_per_period = 16;
@@ -38,30 +37,28 @@ PixelWindow compute_window_of_moving_object(const std::vector<Eigen::Vector3d>& 
     const Eigen::Isometry3d camera_from_world = motion.world_from_camera(time_s).inverse();
     for (const Eigen::Vector3d& point_m : outline_m) {
       const auto pixel = rays.camera_lens().project_point(camera_from_world * point_m);
-      if (!pixel) return make_full_image_window(rays);
-      const Eigen::Array2d at = rays.convert_pixel_to_readout_order(*pixel)
-                                    .array()
-                                    .max(-max_coordinate)
-                                    .min(max_coordinate);
+      if (!pixel) return make_full_window(rays);
+      const Eigen::Array2d at =
+          rays.to_readout_order(*pixel).array().max(-max_coordinate).min(max_coordinate);
       lower = lower.min(at);
       upper = upper.max(at);
     }
   }
   constexpr int bulge_px = 2;  // bulge of the outline between two points
   const int spare = rays.image_margin_px() + bulge_px;
-  const PixelWindow all = make_full_image_window(rays);
+  const PixelWindow all = make_full_window(rays);
   return {std::max(all.line_begin, int(std::floor(lower[0])) - spare),
           std::min(all.line_end, int(std::ceil(upper[0])) + spare + 1),
           std::max(all.place_begin, int(std::floor(lower[1])) - spare),
           std::min(all.place_end, int(std::ceil(upper[1])) + spare + 1)};
 }
 
-PixelWindow intersect_pixel_windows(const PixelWindow& a, const PixelWindow& b) {
+PixelWindow intersect_windows(const PixelWindow& a, const PixelWindow& b) {
   return {std::max(a.line_begin, b.line_begin), std::min(a.line_end, b.line_end),
           std::max(a.place_begin, b.place_begin), std::min(a.place_end, b.place_end)};
 }
 
-Panel make_panel_around_glow(const Glow& glow) {
+Panel make_panel(const Glow& glow) {
   const auto at = [&](double x, double y) {
     return transform_shape_point_to_world(glow.shape, glow.position_m, {x, y});
   };
@@ -69,13 +66,13 @@ Panel make_panel_around_glow(const Glow& glow) {
   return {corner_m, at(1, -1) - corner_m, at(-1, 1) - corner_m, glow.electron_rate_e_per_s};
 }
 
-std::vector<Eigen::Vector3d> compute_object_outline_points(const Glow& glow) {
+std::vector<Eigen::Vector3d> list_outline_points(const Glow& glow) {
   return compute_lamp_outline_points(
-      glow.halo ? make_disc_lamp_shape(2 * compute_light_source_radius_m(glow)) : glow.shape,
+      glow.halo ? make_disc_lamp_shape(2 * compute_source_radius_m(glow)) : glow.shape,
       glow.position_m, 96);
 }
 
-std::vector<Eigen::Vector3d> compute_object_outline_points(const Panel& panel) {
+std::vector<Eigen::Vector3d> list_outline_points(const Panel& panel) {
   constexpr int per_edge = 24;
   std::vector<Eigen::Vector3d> points_m;
   for (int i = 0; i <= per_edge; ++i) {
@@ -88,13 +85,13 @@ std::vector<Eigen::Vector3d> compute_object_outline_points(const Panel& panel) {
   return points_m;
 }
 
-double compute_max_image_motion_px(const std::vector<Eigen::Vector3d>& points_m,
-                                   const CameraFromTarget& camera_from_target, double exposure_s,
-                                   const PixelRays& rays) {
+double compute_max_motion_px(const std::vector<Eigen::Vector3d>& points_m,
+                             const CameraFromTarget& camera_from_target, double exposure_s,
+                             const PixelRays& rays) {
   constexpr int pieces = 16;
   const Eigen::Array2d size(rays.num_readout_lines(), rays.pixels_per_line());
   const auto near_image = [&](const Eigen::Vector2d& pixel) {
-    const Eigen::Array2d at = rays.convert_pixel_to_readout_order(pixel);
+    const Eigen::Array2d at = rays.to_readout_order(pixel);
     return (at >= -0.1 * size).all() && (at <= 1.1 * size).all();
   };
   std::vector<std::optional<Eigen::Vector2d>> before(points_m.size());
@@ -111,7 +108,7 @@ double compute_max_image_motion_px(const std::vector<Eigen::Vector3d>& points_m,
   return lengths_px.empty() ? 0 : *std::max_element(lengths_px.begin(), lengths_px.end());
 }
 
-int count_exposure_time_samples(double motion_px) {
+int count_time_samples(double motion_px) {
   constexpr double max_motion_px = 0.1, max_parts = 1000;
   return 1 + static_cast<int>(std::min(motion_px / max_motion_px, max_parts - 1));
 }

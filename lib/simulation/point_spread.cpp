@@ -14,7 +14,7 @@ namespace {
 constexpr double kGaussianReach = 4;
 constexpr double kDiscStep_px = 0.5;
 
-double compute_max_defocus_radius_px(const Defocus& defocus) {
+double compute_max_defocus_px(const Defocus& defocus) {
   return std::abs(defocus.radius_px) + defocus.tilt_px.lpNorm<1>();
 }
 
@@ -47,8 +47,7 @@ cv::Mat1f blur_by_disc(const cv::Mat1f& image, double radius) {
 
 /// Evaluates a function of (line, place), in pixels, at each element of a part.
 template <typename Figure>
-cv::Mat1f map_pixels_by_distance(const cv::Mat1f& part, const SpreadWindow& window,
-                                 const Figure& figure) {
+cv::Mat1f map_by_distance(const cv::Mat1f& part, const SpreadWindow& window, const Figure& figure) {
   cv::Mat1f map(part.size());
   const auto pixel = [&](int begin, int i) { return begin + (i + 0.5) / window.per_px - 0.5; };
   for (int row = 0; row < map.rows; ++row) {
@@ -62,7 +61,7 @@ cv::Mat1f map_pixels_by_distance(const cv::Mat1f& part, const SpreadWindow& wind
 
 /// Returns the profile of a soft spot, cos^2: 1 in the middle, 0 from 1 on. `distance` is in units
 /// of its radius.
-double compute_soft_spot_profile(double distance) {
+double compute_spot_profile(double distance) {
   const double cosine = distance < 1 ? std::cos(distance * std::numbers::pi / 2) : 0;
   return cosine * cosine;
 }
@@ -71,7 +70,7 @@ double compute_soft_spot_profile(double distance) {
 
 int compute_blur_radius_px(const Optics& optics) {
   double reach = kGaussianReach * optics.blur_px;
-  if (optics.defocus) reach += compute_max_defocus_radius_px(*optics.defocus);
+  if (optics.defocus) reach += compute_max_defocus_px(*optics.defocus);
   double halo = 0;
   for (const LensSmear& smear : optics.smears) halo = std::max(halo, 3 * smear.sigma_px);
   return static_cast<int>(std::ceil(reach + halo));
@@ -85,8 +84,8 @@ void PointSpread::apply_point_spread(cv::Mat1f& part, const SpreadWindow& window
 
 void PointSpread::apply_defocus_blur(cv::Mat1f& part, const SpreadWindow& window) const {
   const Eigen::Array2d half(rays_.num_readout_lines() / 2.0, rays_.pixels_per_line() / 2.0);
-  const Eigen::Vector2d tilt_px = rays_.convert_pixel_to_readout_order(optics_.defocus->tilt_px);
-  const cv::Mat1f radii = map_pixels_by_distance(part, window, [&](const Eigen::Vector2d& at) {
+  const Eigen::Vector2d tilt_px = rays_.to_readout_order(optics_.defocus->tilt_px);
+  const cv::Mat1f radii = map_by_distance(part, window, [&](const Eigen::Vector2d& at) {
     const Eigen::Vector2d from_middle = (at.array() + 0.5 - half) / half;
     return std::abs(optics_.defocus->radius_px + tilt_px.dot(from_middle));
   });
@@ -113,9 +112,9 @@ void PointSpread::apply_defocus_blur(cv::Mat1f& part, const SpreadWindow& window
 
 void PointSpread::apply_lens_smear(const LensSmear& smear, cv::Mat1f& part,
                                    const SpreadWindow& window) const {
-  const Eigen::Vector2d middle = rays_.convert_pixel_to_readout_order(smear.at_px);
-  const cv::Mat1f scattered = map_pixels_by_distance(part, window, [&](const Eigen::Vector2d& at) {
-    return smear.fraction * compute_soft_spot_profile((at - middle).norm() / smear.radius_px);
+  const Eigen::Vector2d middle = rays_.to_readout_order(smear.at_px);
+  const cv::Mat1f scattered = map_by_distance(part, window, [&](const Eigen::Vector2d& at) {
+    return smear.fraction * compute_spot_profile((at - middle).norm() / smear.radius_px);
   });
   cv::Mat1f halo = part.clone();
   blur_by_kernel(halo, window.per_px * smear.sigma_px);
@@ -128,7 +127,7 @@ void PointSpread::add_veiling_glare(cv::Mat1f& image) const {
   image = (1 - optics_.veiling_glare) * image + optics_.veiling_glare * mean;
 }
 
-float PointSpread::extract_veiling_glare_per_pixel(cv::Mat1f& part) const {
+float PointSpread::extract_glare(cv::Mat1f& part) const {
   if (optics_.veiling_glare == 0) return 0;
   const double pixels = double(rays_.num_readout_lines()) * rays_.pixels_per_line();
   const double scattered = optics_.veiling_glare * cv::sum(part)[0] / pixels;
@@ -136,15 +135,13 @@ float PointSpread::extract_veiling_glare_per_pixel(cv::Mat1f& part) const {
   return static_cast<float>(scattered);
 }
 
-cv::Mat1f compute_dust_transmission(const std::vector<Dust>& dust, const PixelRays& rays) {
+cv::Mat1f compute_transmission(const std::vector<Dust>& dust, const PixelRays& rays) {
   cv::Mat1f transmission(rays.num_readout_lines(), rays.pixels_per_line(), 1.F);
   for (const Dust& speck : dust) {
-    const Eigen::Vector2d middle = rays.convert_pixel_to_readout_order(speck.at_px);
-    const cv::Mat1f shadow =
-        map_pixels_by_distance(transmission, {0, 0}, [&](const Eigen::Vector2d& at) {
-          return 1 -
-                 speck.depth * compute_soft_spot_profile((at - middle).norm() / speck.radius_px);
-        });
+    const Eigen::Vector2d middle = rays.to_readout_order(speck.at_px);
+    const cv::Mat1f shadow = map_by_distance(transmission, {0, 0}, [&](const Eigen::Vector2d& at) {
+      return 1 - speck.depth * compute_spot_profile((at - middle).norm() / speck.radius_px);
+    });
     transmission = transmission.mul(shadow);
   }
   return transmission;

@@ -41,7 +41,7 @@ class PointSpread {
 
   /// Removes the fraction scattered by the veil from the light of a part of the scene. Returns the
   /// amount that each pixel of the image receives of it.
-  float extract_veiling_glare_per_pixel(cv::Mat1f& part) const;
+  float extract_glare(cv::Mat1f& part) const;
 
  private:
   void apply_defocus_blur(cv::Mat1f& part, const SpreadWindow& window) const;
@@ -52,6 +52,6 @@ class PointSpread {
 };
 
 /// Returns the fraction of the light that passes the dust on the lens (Dust), as lines x places.
-cv::Mat1f compute_dust_transmission(const std::vector<Dust>& dust, const PixelRays& rays);
+cv::Mat1f compute_transmission(const std::vector<Dust>& dust, const PixelRays& rays);
 
 }  // namespace vlp

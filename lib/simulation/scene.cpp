@@ -70,7 +70,7 @@ Eigen::Vector3d compute_normal(const Panel& pane) {
 
 }  // namespace
 
-cv::RNG make_seeded_random_generator(std::uint64_t seed, std::string_view name, std::size_t index) {
+cv::RNG make_generator(std::uint64_t seed, std::string_view name, std::size_t index) {
   std::vector<std::uint32_t> words{std::uint32_t(seed), std::uint32_t(seed >> 32),
                                    std::uint32_t(index), std::uint32_t(index >> 32)};
   words.insert(words.end(), name.begin(), name.end());
@@ -80,7 +80,7 @@ cv::RNG make_seeded_random_generator(std::uint64_t seed, std::string_view name, 
   return cv::RNG(state[0] | std::uint64_t(state[1]) << 32);
 }
 
-std::uint64_t draw_seed_from_generator(cv::RNG& random) {
+std::uint64_t draw_seed(cv::RNG& random) {
   const std::uint64_t high = random.next();
   return high << 32 | random.next();
 }
@@ -107,14 +107,14 @@ double RectifiedSine::compute_mean_light_fraction(double begin_s, double end_s) 
   return 1 - depth + depth * mean;
 }
 
-LightWave copy_light_wave_with_phase(LightWave wave, double phase) {
+LightWave copy_with_phase(LightWave wave, double phase) {
   std::visit([&](auto& each) { each.phase = phase; }, wave);
   return wave;
 }
 
-void draw_random_scene_parts(Scene& scene) {
+void draw_random_parts(Scene& scene) {
   const auto random = [&](std::string_view name, std::size_t index) {
-    return make_seeded_random_generator(scene.seed, name, index);
+    return make_generator(scene.seed, name, index);
   };
   for (SceneLamp& lamp : scene.lamps) {
     draw_hot_spots(random("chips of a lamp", static_cast<std::size_t>(lamp.id)), lamp.glow);
@@ -131,7 +131,7 @@ void draw_random_scene_parts(Scene& scene) {
   }
 }
 
-Eigen::Isometry3d make_reflection_about_panel(const Panel& pane) {
+Eigen::Isometry3d make_reflection(const Panel& pane) {
   const Eigen::Vector3d normal = compute_normal(pane);
   Eigen::Isometry3d reflection;
   reflection.linear() = Eigen::Matrix3d::Identity() - 2 * normal * normal.transpose();
@@ -139,8 +139,8 @@ Eigen::Isometry3d make_reflection_about_panel(const Panel& pane) {
   return reflection;
 }
 
-bool are_on_same_side_of_mirror(const Mirror& mirror, const Eigen::Vector3d& light_m,
-                                const Eigen::Vector3d& eye_m) {
+bool are_on_same_side(const Mirror& mirror, const Eigen::Vector3d& light_m,
+                      const Eigen::Vector3d& eye_m) {
   const Eigen::Vector3d normal = compute_normal(mirror.pane);
   return normal.dot(light_m - mirror.pane.corner_m) * normal.dot(eye_m - mirror.pane.corner_m) > 0;
 }

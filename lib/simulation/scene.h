@@ -24,10 +24,10 @@ namespace vlp {
 
 /// Returns a random generator seeded by a seed, a name and an index alone; the same on every
 /// machine.
-cv::RNG make_seeded_random_generator(std::uint64_t seed, std::string_view name, std::size_t index);
+cv::RNG make_generator(std::uint64_t seed, std::string_view name, std::size_t index);
 
 /// Draws a random number of 64 bits from `random`, for use as the seed of another generator.
-std::uint64_t draw_seed_from_generator(cv::RNG& random);
+std::uint64_t draw_seed(cv::RNG& random);
 
 /// Square wave that switches a lamp: lit while frac(frequency t + phase) < duty.
 struct SquareWave {
@@ -54,7 +54,7 @@ struct RectifiedSine {
 using LightWave = std::variant<SquareWave, RectifiedSine>;
 
 /// Returns the wave with another phase, in periods.
-LightWave copy_light_wave_with_phase(LightWave wave, double phase);
+LightWave copy_with_phase(LightWave wave, double phase);
 
 /// Straight drive at constant speed.
 struct StraightDrive {
@@ -204,7 +204,7 @@ struct Glow {
   std::optional<Halo> halo = {};
   std::optional<Chips> chips = {};
   std::optional<RandomChips> random_chips = {};
-  /// Hot spots drawn from random_chips by draw_random_scene_parts().
+  /// Hot spots drawn from random_chips by draw_random_parts().
   std::vector<HotSpot> hot_spots = {};
 
   /// Returns half of the first axis: the radius of a disc.
@@ -272,7 +272,7 @@ struct Blind {
 struct Sign {
   Panel panel;
   int lines, letters;
-  /// Strokes as fractions of the edges, drawn by draw_random_scene_parts().
+  /// Strokes as fractions of the edges, drawn by draw_random_parts().
   std::vector<Eigen::AlignedBox2d> strokes;
 };
 
@@ -444,16 +444,16 @@ Scene read_scene_file(const std::filesystem::path& file);
 /// spots of random chips, for each lamp by its id, and the letters of signs.
 ///
 /// read_scene_file() calls it. Call it again after a change of the seed or of one of these parts.
-void draw_random_scene_parts(Scene& scene);
+void draw_random_parts(Scene& scene);
 
 /// Returns the reflection about a panel's plane, in the world:
 ///   p -> p - 2 n n'(p - corner), with the unit normal n.
 /// It is its own inverse; its linear part has the determinant -1.
-Eigen::Isometry3d make_reflection_about_panel(const Panel& pane);
+Eigen::Isometry3d make_reflection(const Panel& pane);
 
 /// Returns true if light and eye are on one side of the mirror's plane, so that the mirror may show
 /// the light.
-bool are_on_same_side_of_mirror(const Mirror& mirror, const Eigen::Vector3d& light_m,
-                                const Eigen::Vector3d& eye_m);
+bool are_on_same_side(const Mirror& mirror, const Eigen::Vector3d& light_m,
+                      const Eigen::Vector3d& eye_m);
 
 }  // namespace vlp

@@ -19,7 +19,7 @@ constexpr Range kRadianceFraction{0, 1, "(of the source's radiance)"};
 constexpr Range kPhase{0, 1, "(of a period)"};
 
 /// Returns the height of the lowest light, m. Mirror images do not count.
-double find_lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& clutter) {
+double compute_lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& clutter) {
   double lowest_m = std::numeric_limits<double>::infinity();
   const auto include_glow = [&](const Glow& glow) {
     lowest_m = std::min(lowest_m, glow.position_m.z());
@@ -39,7 +39,7 @@ double find_lowest_light_m(const std::vector<SceneLamp>& lamps, const Clutter& c
 }
 
 /// Returns the height of the highest point of a panel, m.
-double find_highest_point_m(const Panel& panel) {
+double compute_highest_m(const Panel& panel) {
   return panel.corner_m.z() + std::max(0.0, panel.edge_a_m.z()) + std::max(0.0, panel.edge_b_m.z());
 }
 
@@ -213,10 +213,10 @@ void describe(YamlMap& io, Clutter& clutter, const std::vector<SceneLamp>& lamps
   io.optional("signs", clutter.signs);
   io.optional("ambient_flicker", clutter.ambient_flicker);
   // An occluder is rendered as hiding all lights.
-  const double lowest_m = find_lowest_light_m(lamps, clutter);
+  const double lowest_m = compute_lowest_light_m(lamps, clutter);
   io.optional("occluders", clutter.occluders, [&](YamlMap& map, Panel& occluder) {
     describe(map, occluder);
-    map.check(find_highest_point_m(occluder) < lowest_m, "is not below every lamp and other light");
+    map.check(compute_highest_m(occluder) < lowest_m, "is not below every lamp and other light");
   });
 }
 

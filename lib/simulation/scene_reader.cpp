@@ -78,8 +78,7 @@ static void describe(YamlMap& io, Sensor& sensor) {
   io.required("bits", sensor.bits, Range{8, 16})
       .check(sensor.bits == 8 || sensor.bits == 16, "should be 8 or 16");
   io.required("gain_dn_per_e", sensor.gain_dn_per_e, Range{1e-6, 1e4, "DN per electron"});
-  io.required("black_level_dn", sensor.black_level_dn,
-              Range{0, sensor_white_level_dn(sensor), "DN"});
+  io.required("black_level_dn", sensor.black_level_dn, Range{0, white_level_dn(sensor), "DN"});
   io.required("full_well_e", sensor.full_well_e, Range{1, 1e9, "electrons"});
   io.required("read_noise_e", sensor.read_noise_e, Range{0, 1e6, "electrons"});
   io.required("shot_noise", sensor.shot_noise);
@@ -98,7 +97,7 @@ static void describe(YamlMap& io, Bayer& bayer) {
 }
 
 static void describe(YamlMap& io, ImageProcessing& processing, const Sensor& sensor) {
-  io.check(sensor.black_level_dn < sensor_white_level_dn(sensor),
+  io.check(sensor.black_level_dn < white_level_dn(sensor),
            "needs levels between sensor.black_level_dn and white");
   io.required("gamma", processing.gamma, Range{0.1, 10, "(of the tone curve)"});
   io.optional("sharpening", processing.sharpening);
@@ -173,7 +172,7 @@ static void describe(YamlMap& io, Scene& scene) {
 
 Scene read_scene_file(const std::filesystem::path& file) {
   auto scene = read_yaml_document<Scene>(file, "vlp-scene/1");
-  draw_random_scene_parts(scene);
+  draw_random_parts(scene);
   return scene;
 }
 

@@ -14,7 +14,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// Returns the index of the closest line.
-int find_closest_line(const std::vector<double>& lines, double at) {
+int get_closest_line(const std::vector<double>& lines, double at) {
   const auto closer = [&](double a, double b) { return std::abs(a - at) < std::abs(b - at); };
   return static_cast<int>(std::min_element(lines.begin(), lines.end(), closer) - lines.begin());
 }
@@ -27,8 +27,8 @@ Eigen::Matrix<double, 2, 4> to_matrix(const std::array<Eigen::Vector2d, 4>& corn
 /// Traversal of the cells along one axis: the current cell, and the fraction of the path at which
 /// it ends.
 struct CellTraversal {
-  CellTraversal(const PatternLines& all, double from, double displacement)
-      : lines(all.coordinates_m()), start(from), length(displacement), cell(all.find_cell(from)) {
+  CellTraversal(const EdgeCoordinates& all, double from, double displacement)
+      : lines(all.coordinates_m()), start(from), length(displacement), cell(all.locate_cell(from)) {
     if (displacement < 0 && cell > 0 && lines[std::size_t(cell) - 1] == from) --cell;  // downwards
   }
   double end() const {
@@ -45,7 +45,7 @@ struct CellTraversal {
 
 }  // namespace
 
-PatternLines::PatternLines(std::vector<double> lines_m) : lines_m_(std::move(lines_m)) {
+EdgeCoordinates::EdgeCoordinates(std::vector<double> lines_m) : lines_m_(std::move(lines_m)) {
   constexpr double same_m = 1e-9;
   constexpr std::size_t intervals_per_line = 4;
   std::sort(lines_m_.begin(), lines_m_.end());
@@ -56,20 +56,20 @@ PatternLines::PatternLines(std::vector<double> lines_m) : lines_m_(std::move(lin
   intervals_per_m_ =
       static_cast<double>(lines_before_.size()) / (lines_m_.back() - lines_m_.front());
   for (std::size_t i = 0; i < lines_before_.size(); ++i) {
-    lines_before_[i] = static_cast<int>(
-        std::ranges::count_if(lines_m_, [&](double line_m) { return find_interval(line_m) < i; }));
+    lines_before_[i] = static_cast<int>(std::ranges::count_if(
+        lines_m_, [&](double line_m) { return locate_interval(line_m) < i; }));
   }
 }
 
-std::size_t PatternLines::find_interval(double at_m) const {
+std::size_t EdgeCoordinates::locate_interval(double at_m) const {
   const double last = static_cast<double>(lines_before_.size()) - 1;
   return static_cast<std::size_t>(
       std::clamp((at_m - lines_m_.front()) * intervals_per_m_, 0.0, last));
 }
 
-int PatternLines::find_cell(double at_m) const {
+int EdgeCoordinates::locate_cell(double at_m) const {
   std::size_t cell =
-      lines_before_.empty() ? 0 : static_cast<std::size_t>(lines_before_[find_interval(at_m)]);
+      lines_before_.empty() ? 0 : static_cast<std::size_t>(lines_before_[locate_interval(at_m)]);
   while (cell < lines_m_.size() && lines_m_[cell] <= at_m) ++cell;
   return static_cast<int>(cell);
 }
@@ -80,19 +80,19 @@ RectanglePattern::RectanglePattern(const std::vector<Rectangle>& rectangles) {
     x_m.insert(x_m.end(), {each.left_m, each.right_m});
     y_m.insert(y_m.end(), {each.top_m, each.bottom_m});
   }
-  x_ = PatternLines(std::move(x_m));
-  y_ = PatternLines(std::move(y_m));
+  x_ = EdgeCoordinates(std::move(x_m));
+  y_ = EdgeCoordinates(std::move(y_m));
   stride_ = x_.coordinates_m().size() + 1;
   values_.assign(stride_ * (y_.coordinates_m().size() + 1), 0);
-  for (const Rectangle& rectangle : rectangles) fill_pattern_rectangle(rectangle);
-  compute_cumulative_row_integrals();
+  for (const Rectangle& rectangle : rectangles) fill_rectangle(rectangle);
+  fill_row_integrals();
 }
 
-void RectanglePattern::fill_pattern_rectangle(const Rectangle& rectangle) {
-  const int top = find_closest_line(y_.coordinates_m(), rectangle.top_m),
-            bottom = find_closest_line(y_.coordinates_m(), rectangle.bottom_m);
-  const int left = find_closest_line(x_.coordinates_m(), rectangle.left_m),
-            right = find_closest_line(x_.coordinates_m(), rectangle.right_m);
+void RectanglePattern::fill_rectangle(const Rectangle& rectangle) {
+  const int top = get_closest_line(y_.coordinates_m(), rectangle.top_m),
+            bottom = get_closest_line(y_.coordinates_m(), rectangle.bottom_m);
+  const int left = get_closest_line(x_.coordinates_m(), rectangle.left_m),
+            right = get_closest_line(x_.coordinates_m(), rectangle.right_m);
   for (int row = top + 1; row <= bottom; ++row) {
     for (int column = left + 1; column <= right; ++column) {
       values_[flat_cell_index(column, row)] = rectangle.value;
@@ -100,7 +100,7 @@ void RectanglePattern::fill_pattern_rectangle(const Rectangle& rectangle) {
   }
 }
 
-void RectanglePattern::compute_cumulative_row_integrals() {
+void RectanglePattern::fill_row_integrals() {
   const std::vector<double>& x_m = x_.coordinates_m();
   sums_.assign(values_.size(), 0);
   for (std::size_t i = 0; i < values_.size(); ++i) {
@@ -111,14 +111,13 @@ void RectanglePattern::compute_cumulative_row_integrals() {
 }
 
 /// Returns the integral of the pattern along a row up to x, which lies in the given column.
-double RectanglePattern::integrate_pattern_row_up_to(int column, int row, double x) const {
+double RectanglePattern::integrate_row(int column, int row, double x) const {
   if (column == 0) return 0;
   const std::size_t i = flat_cell_index(column, row);
   return sums_[i] + values_[i] * (x - x_.coordinates_m()[static_cast<std::size_t>(column) - 1]);
 }
 
-double RectanglePattern::compute_edge_contribution_to_area_integral(
-    const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+double RectanglePattern::integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
   const Eigen::Vector2d displacement = q - p;
   if (!displacement.allFinite()) return std::numeric_limits<double>::quiet_NaN();
   CellTraversal x(x_, p.x(), displacement.x()), y(y_, p.y(), displacement.y());
@@ -127,7 +126,7 @@ double RectanglePattern::compute_edge_contribution_to_area_integral(
     const double x_end = x.end(), y_end = y.end();
     const double next = std::min({x_end, y_end, 1.0});
     const double middle = p.x() + displacement.x() * (done + next) / 2;
-    sum += integrate_pattern_row_up_to(x.cell, y.cell, middle) * (next - done);
+    sum += integrate_row(x.cell, y.cell, middle) * (next - done);
     if (x_end <= y_end) {
       x.step();
     } else {
@@ -138,13 +137,13 @@ double RectanglePattern::compute_edge_contribution_to_area_integral(
   return sum * displacement.y();
 }
 
-std::optional<double> RectanglePattern::find_constant_value_in_quadrilateral(
+std::optional<double> RectanglePattern::find_uniform_value(
     const std::array<Eigen::Vector2d, 4>& corners) const {
   const auto points = to_matrix(corners);
   if (!points.allFinite()) return std::nullopt;
   const Eigen::Vector2d lower = points.rowwise().minCoeff(), upper = points.rowwise().maxCoeff();
-  const int left = x_.find_cell(lower.x()), right = x_.find_cell(upper.x());
-  const int top = y_.find_cell(lower.y()), bottom = y_.find_cell(upper.y());
+  const int left = x_.locate_cell(lower.x()), right = x_.locate_cell(upper.x());
+  const int top = y_.locate_cell(lower.y()), bottom = y_.locate_cell(upper.y());
   const double value = values_[flat_cell_index(left, top)];
   for (int row = top; row <= bottom; ++row) {
     const auto cell = values_.begin() + static_cast<std::ptrdiff_t>(flat_cell_index(left, row));
@@ -154,18 +153,16 @@ std::optional<double> RectanglePattern::find_constant_value_in_quadrilateral(
   return value;
 }
 
-double Disc::integrate_disc_radiance_in_triangle(const Eigen::Vector2d& p,
-                                                 const Eigen::Vector2d& q) const {
+double Disc::integrate_triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
   return cross_product_2d(p, q) *
          (0.5 - fall_ / 12 * (p.squaredNorm() + p.dot(q) + q.squaredNorm()));
 }
 
-double Disc::integrate_disc_radiance_in_sector(const Eigen::Vector2d& p,
-                                               const Eigen::Vector2d& q) const {
+double Disc::integrate_sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
   return std::atan2(cross_product_2d(p, q), p.dot(q)) * (0.5 - fall_ / 4);
 }
 
-std::optional<double> Disc::find_constant_value_in_quadrilateral(
+std::optional<double> Disc::find_uniform_value(
     const std::array<Eigen::Vector2d, 4>& corners) const {
   const auto points = to_matrix(corners);
   const bool outside =
@@ -173,22 +170,20 @@ std::optional<double> Disc::find_constant_value_in_quadrilateral(
   return outside ? std::optional(0.0) : std::nullopt;
 }
 
-double Disc::compute_edge_contribution_to_area_integral(const Eigen::Vector2d& p,
-                                                        const Eigen::Vector2d& q) const {
-  if (p.squaredNorm() <= 1 && q.squaredNorm() <= 1)
-    return integrate_disc_radiance_in_triangle(p, q);
+double Disc::integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const {
+  if (p.squaredNorm() <= 1 && q.squaredNorm() <= 1) return integrate_triangle(p, q);
   // |p + t (q - p)| = 1
   const Eigen::Vector2d displacement = q - p;
   const double a = displacement.squaredNorm(), b = p.dot(displacement), c = p.squaredNorm() - 1;
   const double discriminant = b * b - a * c;
-  if (!(discriminant > 0)) return integrate_disc_radiance_in_sector(p, q);
+  if (!(discriminant > 0)) return integrate_sector(p, q);
   const double root = std::sqrt(discriminant);
   const double enters = std::max((-b - root) / a, 0.0), leaves = std::min((-b + root) / a, 1.0);
-  if (!(enters < leaves)) return integrate_disc_radiance_in_sector(p, q);
+  if (!(enters < leaves)) return integrate_sector(p, q);
   const Eigen::Vector2d in = p + enters * displacement, out = p + leaves * displacement;
-  double sum = integrate_disc_radiance_in_triangle(in, out);
-  if (enters > 0) sum += integrate_disc_radiance_in_sector(p, in);
-  if (leaves < 1) sum += integrate_disc_radiance_in_sector(out, q);
+  double sum = integrate_triangle(in, out);
+  if (enters > 0) sum += integrate_sector(p, in);
+  if (leaves < 1) sum += integrate_sector(out, q);
   return sum;
 }
 

@@ -18,20 +18,20 @@ struct Rectangle {
 };
 
 /// Lines of a pattern across one axis, ascending, with a table for a quick search.
-class PatternLines {
+class EdgeCoordinates {
  public:
-  PatternLines() = default;
+  EdgeCoordinates() = default;
   /// @param lines_m  coordinates in any order; those closer than 1 nm are merged
-  explicit PatternLines(std::vector<double> lines_m);
+  explicit EdgeCoordinates(std::vector<double> lines_m);
 
   const std::vector<double>& coordinates_m() const { return lines_m_; }
   /// Returns the number of lines at or below a coordinate: 0 before the first.
-  int find_cell(double at_m) const;
+  int locate_cell(double at_m) const;
 
  private:
   /// Returns the index in the table of the equal interval that contains a coordinate; of the first
   /// or the last one outside them.
-  std::size_t find_interval(double at_m) const;
+  std::size_t locate_interval(double at_m) const;
 
   std::vector<double> lines_m_;
   double intervals_per_m_ = 0;
@@ -46,30 +46,27 @@ class RectanglePattern {
   /// Creates the pattern; later rectangles cover earlier ones. Edges closer than 1 nm are merged.
   explicit RectanglePattern(const std::vector<Rectangle>& rectangles);
 
-  Eigen::Vector2d intersect_ray_with_shape(const Eigen::Vector3d& origin,
-                                           const Eigen::Vector3d& direction) const {
-    return intersect_ray_with_plane(origin, direction);
+  Eigen::Vector2d intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+    return intersect_plane(origin, direction);
   }
 
   /// Returns the integral of G dy along the edge from p to q. G(x, y) is the integral of the
   /// pattern along the row from minus infinity to x.
-  double compute_edge_contribution_to_area_integral(const Eigen::Vector2d& p,
-                                                    const Eigen::Vector2d& q) const;
+  double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
   /// Returns the value of the pattern over a quadrilateral; std::nullopt if the pattern varies
   /// within the box around the corners, or if a corner is not finite.
-  std::optional<double> find_constant_value_in_quadrilateral(
-      const std::array<Eigen::Vector2d, 4>& corners) const;
+  std::optional<double> find_uniform_value(const std::array<Eigen::Vector2d, 4>& corners) const;
 
  private:
-  void fill_pattern_rectangle(const Rectangle& rectangle);
-  void compute_cumulative_row_integrals();
+  void fill_rectangle(const Rectangle& rectangle);
+  void fill_row_integrals();
   std::size_t flat_cell_index(int column, int row) const {
     return static_cast<std::size_t>(row) * stride_ + static_cast<std::size_t>(column);
   }
-  double integrate_pattern_row_up_to(int column, int row, double x) const;
+  double integrate_row(int column, int row, double x) const;
 
-  PatternLines x_, y_;
+  EdgeCoordinates x_, y_;
   /// Row by row. Each row begins with the empty cell to its left and ends with the one to its
   /// right.
   std::vector<double> values_, sums_;
@@ -83,27 +80,22 @@ class Disc {
   Disc(const Eigen::Vector2d& half_axes_m, double rim_to_center_ratio)
       : half_axes_m_(half_axes_m), fall_(1 - rim_to_center_ratio) {}
 
-  Eigen::Vector2d intersect_ray_with_shape(const Eigen::Vector3d& origin,
-                                           const Eigen::Vector3d& direction) const {
-    return intersect_ray_with_plane(origin, direction).cwiseQuotient(half_axes_m_);
+  Eigen::Vector2d intersect(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
+    return intersect_plane(origin, direction).cwiseQuotient(half_axes_m_);
   }
 
   /// Returns 0 for a quadrilateral on the outer side of one side of the square around the disc.
-  std::optional<double> find_constant_value_in_quadrilateral(
-      const std::array<Eigen::Vector2d, 4>& corners) const;
+  std::optional<double> find_uniform_value(const std::array<Eigen::Vector2d, 4>& corners) const;
 
   /// Returns the integral over the part of the triangle (0, p, q) inside the disc, in units of the
   /// radius. add_shape_to_image() needs no other triangles.
   ///   Triangle inside: the area (p x q) / 2; of r^2, (p x q) (p p + p q + q q) / 12.
   ///   Sector of angle a: the area a / 2; of r^2, a / 4.
-  double compute_edge_contribution_to_area_integral(const Eigen::Vector2d& p,
-                                                    const Eigen::Vector2d& q) const;
+  double integrate_edge(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
  private:
-  double integrate_disc_radiance_in_triangle(const Eigen::Vector2d& p,
-                                             const Eigen::Vector2d& q) const;
-  double integrate_disc_radiance_in_sector(const Eigen::Vector2d& p,
-                                           const Eigen::Vector2d& q) const;
+  double integrate_triangle(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
+  double integrate_sector(const Eigen::Vector2d& p, const Eigen::Vector2d& q) const;
 
   Eigen::Vector2d half_axes_m_;
   double fall_;

@@ -19,7 +19,7 @@ namespace {
 std::string make_image_name(const Scene& scene, std::size_t index, std::size_t count) {
   const std::string number = std::to_string(index);
   const std::size_t digits = std::max<std::size_t>(4, std::to_string(count - 1).size());
-  return std::string(digits - number.size(), '0') + number + image_file_extension(scene.processing);
+  return std::string(digits - number.size(), '0') + number + image_extension(scene.processing);
 }
 
 Eigen::Matrix3d rotation(double angle_rad, const Eigen::Vector3d& axis) {
@@ -32,7 +32,7 @@ struct CaptureIndices {
   double driven_s;
 };
 
-CaptureIndices find_capture_indices(const LampShots& captures, std::size_t index) {
+CaptureIndices compute_capture_indices(const LampShots& captures, std::size_t index) {
   const std::size_t pivots = captures.pivots_m.size(), yaws = captures.yaws_rad.size();
   const auto repeat = static_cast<std::size_t>(captures.repeat);
   if (captures.drive) {
@@ -68,7 +68,7 @@ Pose BaseMotion::camera_pose_at(double time_s) const {
   return pose;
 }
 
-Inclination BaseMotion::base_inclination_at(double time_s) const {
+Inclination BaseMotion::inclination_at(double time_s) const {
   const double angle = phase_rad + 2 * std::numbers::pi * vibration.frequency_hz * time_s;
   return {inclination.roll_rad + vibration.amplitude_rad * std::sin(angle),
           inclination.pitch_rad + vibration.amplitude_rad * std::cos(angle)};
@@ -83,7 +83,7 @@ Eigen::Isometry3d BaseMotion::world_from_camera(double time_s) const {
   const Pose level = camera_pose_at(time_s);
   Eigen::Isometry3d world_from_camera;
   world_from_camera.linear() = rotation_about_z(level.yaw_rad) *
-                               level_rotation_from_inclination(base_inclination_at(time_s)) *
+                               level_rotation_from_inclination(inclination_at(time_s)) *
                                mount.level_from_camera;
   world_from_camera.translation() = level.position_m;
   return world_from_camera;
@@ -93,22 +93,21 @@ Eigen::Isometry3d BoardShot::camera_from_board(double time_s) const {
   return Eigen::Translation3d(velocity_in_camera_m_per_s * time_s) * camera_from_board_at_0;
 }
 
-std::size_t count_captures_of_set(const CaptureSet& set) {
+std::size_t count_shots(const CaptureSet& set) {
   if (set.board) return static_cast<std::size_t>(set.board->count);
   const LampShots& lamps = *set.lamps;
   return lamps.heights_m.size() * lamps.pivots_m.size() * lamps.yaws_rad.size() *
          static_cast<std::size_t>(lamps.repeat);
 }
 
-LampShot make_lamp_capture_parameters(const Scene& scene, const CaptureSet& set,
-                                      std::size_t index) {
+LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
   const LampShots& captures = *set.lamps;
-  cv::RNG random = make_seeded_random_generator(scene.seed, set.folder, index);
-  const CaptureIndices indices = find_capture_indices(captures, index);
+  cv::RNG random = make_generator(scene.seed, set.folder, index);
+  const CaptureIndices indices = compute_capture_indices(captures, index);
   const double jitter_rad = captures.yaw_jitter_rad * random.uniform(-1.0, 1.0);
 
   LampShot shot;
-  shot.image = make_image_name(scene, index, count_captures_of_set(set));
+  shot.image = make_image_name(scene, index, count_shots(set));
   shot.time_s = static_cast<double>(index) * captures.interval_s;
   shot.exposure_s = set.exposure_s;
   shot.motion.axis_m << captures.pivots_m[indices.pivot], captures.heights_m[indices.height];
@@ -121,7 +120,7 @@ LampShot make_lamp_capture_parameters(const Scene& scene, const CaptureSet& set,
   shot.motion.yaw_rad =
       captures.yaws_rad[indices.yaw] + jitter_rad + captures.turn_rate_rad_per_s * indices.driven_s;
   shot.motion.mount = scene.mount;
-  const std::size_t last = count_captures_of_set(set) - 1;
+  const std::size_t last = count_shots(set) - 1;
   const double fraction = last > 0 ? static_cast<double>(index) / static_cast<double>(last) : 0;
   const auto ramp = [&](const std::pair<double, double>& ends) {
     return ends.first + fraction * (ends.second - ends.first);
@@ -138,23 +137,22 @@ LampShot make_lamp_capture_parameters(const Scene& scene, const CaptureSet& set,
   for (const SceneLamp& lamp : scene.lamps) {
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, draw_phase(lamp.phase, lamp.frequency_hz)});
   }
-  shot.noise_seed = draw_seed_from_generator(random);
+  shot.noise_seed = draw_seed(random);
   // Drawn last, so that the other random values equal those of a scene without such lights.
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
     const double frequency_hz =
         std::visit([](const auto& wave) { return wave.frequency_hz; }, light.wave);
     shot.foreign_waves.push_back(
-        copy_light_wave_with_phase(light.wave, draw_phase(light.phase, frequency_hz)));
+        copy_with_phase(light.wave, draw_phase(light.phase, frequency_hz)));
   }
   if (scene.clutter.ambient_flicker) shot.ambient_phase = random.uniform(0.0, 1.0);
   return shot;
 }
 
-BoardShot make_board_capture_parameters(const Scene& scene, const CaptureSet& set,
-                                        std::size_t index) {
+BoardShot make_board_shot(const Scene& scene, const CaptureSet& set, std::size_t index) {
   const BoardViews& views = *set.board;
   const Lens lens(scene.camera.lens_model, scene.camera.intrinsics);
-  cv::RNG random = make_seeded_random_generator(scene.seed, set.folder, index);
+  cv::RNG random = make_generator(scene.seed, set.folder, index);
   const auto fraction = [&] { return random.uniform(-1.0, 1.0); };
 
   // The board's center is placed on a random ray and the board faces the camera; then it is rotated
@@ -174,7 +172,7 @@ BoardShot make_board_capture_parameters(const Scene& scene, const CaptureSet& se
   const Eigen::Vector3d tilt_axis(std::cos(azimuth), std::sin(azimuth), 0);
 
   BoardShot shot;
-  shot.image = make_image_name(scene, index, count_captures_of_set(set));
+  shot.image = make_image_name(scene, index, count_shots(set));
   shot.exposure_s = set.exposure_s;
   shot.camera_from_board_at_0.linear() =
       facing * rotation(tilt, tilt_axis) * rotation(roll, Eigen::Vector3d::UnitZ());
@@ -183,7 +181,7 @@ BoardShot make_board_capture_parameters(const Scene& scene, const CaptureSet& se
   shot.camera_from_board_at_0.translation() =
       distance_m * sight - shot.camera_from_board_at_0.linear() * middle_m;
   shot.velocity_in_camera_m_per_s = views.velocity_m_per_s;
-  shot.noise_seed = draw_seed_from_generator(random);
+  shot.noise_seed = draw_seed(random);
   return shot;
 }
 

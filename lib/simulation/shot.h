@@ -12,8 +12,8 @@
 namespace vlp {
 
 /// Exposure times of the lines of a sensor. Time 0 is the middle of the middle line's exposure. An
-/// exposure is divided into `count` equal parts; `index` is the part that exposure_sample_begin_s()
-/// and exposure_sample_end_s() describe.
+/// exposure is divided into `count` equal parts; `index` is the part that sample_begin_s()
+/// and sample_end_s() describe.
 struct Shutter {
   double row_time_s, exposure_s;
   int lines;
@@ -21,19 +21,13 @@ struct Shutter {
 
   /// Returns the time of the middle of a line's exposure, s, relative to that of the middle line.
   /// `line` counts from 0 and may be fractional or outside the image.
-  double line_exposure_center_s(double line) const {
-    return (line - (lines - 1) / 2.0) * row_time_s;
-  }
+  double line_center_s(double line) const { return (line - (lines - 1) / 2.0) * row_time_s; }
   /// Returns the begin of part `index` of a line's exposure, s, on the same time scale.
-  double exposure_sample_begin_s(int line) const {
-    return line_exposure_center_s(line) + (double(index) / count - 0.5) * exposure_s;
+  double sample_begin_s(int line) const {
+    return line_center_s(line) + (double(index) / count - 0.5) * exposure_s;
   }
-  double exposure_sample_end_s(int line) const {
-    return exposure_sample_begin_s(line) + exposure_s / count;
-  }
-  double exposure_part_middle_s(int line) const {
-    return (exposure_sample_begin_s(line) + exposure_sample_end_s(line)) / 2;
-  }
+  double sample_end_s(int line) const { return sample_begin_s(line) + exposure_s / count; }
+  double part_middle_s(int line) const { return (sample_begin_s(line) + sample_end_s(line)) / 2; }
 };
 
 /// Motion of the camera on its base during a capture. Time 0 is the middle of the exposure of the
@@ -58,7 +52,7 @@ struct BaseMotion {
   bool is_base_level() const {
     return inclination.roll_rad == 0 && inclination.pitch_rad == 0 && vibration.amplitude_rad == 0;
   }
-  Inclination base_inclination_at(double time_s) const;
+  Inclination inclination_at(double time_s) const;
   /// Returns the velocity of the camera, on its lever arm, in the world at time 0.
   Eigen::Vector2d camera_velocity_m_per_s() const;
   Pose camera_pose_at(double time_s) const;
@@ -92,13 +86,12 @@ struct BoardShot {
 };
 
 /// Returns the number of captures of a set.
-std::size_t count_captures_of_set(const CaptureSet& set);
+std::size_t count_shots(const CaptureSet& set);
 
 /// Returns capture `index` of a set. It depends on the scene, its seed, the set's folder and the
 /// index alone.
-/// @pre index < count_captures_of_set(set)
-LampShot make_lamp_capture_parameters(const Scene& scene, const CaptureSet& set, std::size_t index);
-BoardShot make_board_capture_parameters(const Scene& scene, const CaptureSet& set,
-                                        std::size_t index);
+/// @pre index < count_shots(set)
+LampShot make_lamp_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
+BoardShot make_board_shot(const Scene& scene, const CaptureSet& set, std::size_t index);
 
 }  // namespace vlp

@@ -45,8 +45,8 @@ void make_folder(const fs::path& folder) {
 
 void write_common_files(const Scene& scene, const fs::path& output) {
   if (!scene.lamps.empty()) {
-    write_lamp_map(output / "lamps.yaml", make_scene_lamp_map(scene, true));
-    write_lamp_map(output / "true_lamps.yaml", make_scene_lamp_map(scene, false));
+    write_lamp_map(output / "lamps.yaml", make_lamp_map(scene, true));
+    write_lamp_map(output / "true_lamps.yaml", make_lamp_map(scene, false));
   }
   if (scene.board) write_board(output / "board.yaml", scene.board->pattern);
   write_calibration(output / "true_calibration.yaml", make_true_calibration(scene));
@@ -54,8 +54,7 @@ void write_common_files(const Scene& scene, const fs::path& output) {
 
 void write_image(const fs::path& file, const cv::Mat& lines, const Scene& scene) {
   const bool by_rows = scene.camera.readout == Readout::rows;
-  const auto bytes =
-      encode_image_as_jpeg_or_png(by_rows ? lines : cv::Mat(lines.t()), scene.processing);
+  const auto bytes = encode_image(by_rows ? lines : cv::Mat(lines.t()), scene.processing);
   write_file(file, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
@@ -69,13 +68,13 @@ bool render_capture(const Scene& scene, const FrameRenderer& renderer, const Cap
     return true;
   };
   if (set.board) {
-    const BoardShot shot = make_board_capture_parameters(scene, set, index);
+    const BoardShot shot = make_board_shot(scene, set, index);
     return write(
-        shot.image, [&] { return renderer.render_board_in_electrons(shot); }, shot.noise_seed);
+        shot.image, [&] { return renderer.render_board(shot); }, shot.noise_seed);
   }
-  const LampShot shot = make_lamp_capture_parameters(scene, set, index);
+  const LampShot shot = make_lamp_shot(scene, set, index);
   return write(
-      shot.image, [&] { return renderer.render_lamps_in_electrons(shot); }, shot.noise_seed);
+      shot.image, [&] { return renderer.render_lamps(shot); }, shot.noise_seed);
 }
 
 /// Returns the gray level of a source that fills a pixel on the axis. Without a picture it may
@@ -85,17 +84,16 @@ double compute_level(const Scene& scene, const CaptureSet& set, double electron_
   const double level =
       sensor.black_level_dn +
       sensor.gain_dn_per_e * std::min(electron_rate_e_per_s * set.exposure_s, sensor.full_well_e);
-  return scene.processing ? apply_tone_curve_to_gray_level(*scene.processing, sensor, level)
-                          : level;
+  return scene.processing ? apply_tone_curve(*scene.processing, sensor, level) : level;
 }
 
 std::string whole(double value) { return std::to_string(std::lround(value)); }
 
-void add_brightness_warnings(const Scene& scene, const CaptureSet& set, const std::string& bright,
-                             double bright_e_per_s, const std::string& dark, double dark_e_per_s,
-                             std::vector<std::string>& warnings) {
+void warn_about_brightness(const Scene& scene, const CaptureSet& set, const std::string& bright,
+                           double bright_e_per_s, const std::string& dark, double dark_e_per_s,
+                           std::vector<std::string>& warnings) {
   constexpr double too_dark = 0.03, too_bright = 0.6;
-  const double white = sensor_white_level_dn(scene.sensor);
+  const double white = white_level_dn(scene.sensor);
   const std::string fit =
       ": does sensor.gain_dn_per_e suit sensor.bits, and the light the exposure?";
   const double high = compute_level(scene, set, bright_e_per_s);
@@ -111,8 +109,8 @@ void add_brightness_warnings(const Scene& scene, const CaptureSet& set, const st
   }
 }
 
-void add_stripe_warnings(const Scene& scene, const CaptureSet& set,
-                         std::vector<std::string>& warnings) {
+void warn_about_stripes(const Scene& scene, const CaptureSet& set,
+                        std::vector<std::string>& warnings) {
   constexpr double min_period_lines = 2.2;
   for (const SceneLamp& lamp : scene.lamps) {
     const std::string name = set.folder + ": lamp " + std::to_string(lamp.id);
@@ -128,8 +126,8 @@ void add_stripe_warnings(const Scene& scene, const CaptureSet& set,
 
 }  // namespace
 
-std::string make_simulation_provenance(const fs::path& scene, std::optional<std::uint64_t> seed,
-                                       const std::string& program, const std::string& version) {
+std::string make_provenance(const fs::path& scene, std::optional<std::uint64_t> seed,
+                            const std::string& program, const std::string& version) {
   constexpr std::size_t max_bytes = 1 << 20;
   std::string text = read_text_file(scene, max_bytes);
   const std::string mark = "# " + program + " ";
@@ -166,29 +164,29 @@ void claim_output_folder(const fs::path& output, const std::string& provenance) 
   write_file(mark, provenance);
 }
 
-SimulationSummary render_scene_to_folder(const Scene& scene, const fs::path& output,
-                                         const SimulationOptions& options,
-                                         const SimulationProgress& progress) {
+SimulationSummary render_scene(const Scene& scene, const fs::path& output,
+                               const SimulationOptions& options,
+                               const SimulationProgress& progress) {
   const std::vector<CaptureSet> sets = select_sets(scene, options.folders);
   const FrameRenderer renderer(scene);
   claim_output_folder(output, options.provenance);
   write_common_files(scene, output);
 
   std::size_t total = 0;
-  for (const CaptureSet& set : sets) total += count_captures_of_set(set);
+  for (const CaptureSet& set : sets) total += count_shots(set);
   SimulationSummary summary;
   std::mutex counting;
   for (const CaptureSet& set : sets) {
     const fs::path folder = output / set.folder;
     make_folder(folder);
-    const auto warnings = find_scene_warnings(scene, set);
+    const auto warnings = list_scene_warnings(scene, set);
     summary.warnings.insert(summary.warnings.end(), warnings.begin(), warnings.end());
     if (const std::size_t empty = write_truth_tables(scene, renderer, set, folder); empty > 0) {
       // [GATE-5] `is in view in`
       summary.warnings.push_back(set.folder + ": nothing is in view in " + std::to_string(empty) +
-                                 " of " + std::to_string(count_captures_of_set(set)) + " captures");
+                                 " of " + std::to_string(count_shots(set)) + " captures");
     }
-    parallel_for(count_captures_of_set(set), options.threads, [&](std::size_t index) {
+    parallel_for(count_shots(set), options.threads, [&](std::size_t index) {
       const bool rendered = render_capture(scene, renderer, set, index, folder);
       const std::lock_guard lock(counting);
       ++(rendered ? summary.rendered : summary.existing);
@@ -198,20 +196,20 @@ SimulationSummary render_scene_to_folder(const Scene& scene, const fs::path& out
   return summary;
 }
 
-std::vector<std::string> find_scene_warnings(const Scene& scene, const CaptureSet& set) {
+std::vector<std::string> list_scene_warnings(const Scene& scene, const CaptureSet& set) {
   std::vector<std::string> warnings;
   if (set.board) {
-    add_brightness_warnings(scene, set, "the board's white", scene.board->white_e_per_s,
-                            "its black", scene.board->black_e_per_s, warnings);
+    warn_about_brightness(scene, set, "the board's white", scene.board->white_e_per_s, "its black",
+                          scene.board->black_e_per_s, warnings);
     return warnings;
   }
   double brightest = 0;
   for (const SceneLamp& lamp : scene.lamps) {
     brightest = std::max(brightest, lamp.glow.electron_rate_e_per_s);
   }
-  add_brightness_warnings(scene, set, "the brightest lamp", brightest + scene.ambient_e_per_s,
-                          "the ceiling", scene.ambient_e_per_s, warnings);
-  add_stripe_warnings(scene, set, warnings);
+  warn_about_brightness(scene, set, "the brightest lamp", brightest + scene.ambient_e_per_s,
+                        "the ceiling", scene.ambient_e_per_s, warnings);
+  warn_about_stripes(scene, set, warnings);
   return warnings;
 }
 

@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Options of render_scene_to_folder().
+/// Options of render_scene().
 struct SimulationOptions {
   /// Names of the folders of the scene to render. Empty: all folders of the scene.
   std::vector<std::string> folders;
@@ -27,13 +27,12 @@ struct SimulationOptions {
 /// vlp-simulate 0.1.0". An existing line of that kind is replaced. If `seed` is given, it replaces
 /// the seed of the scene.
 /// @throws InputError if the file cannot be read, or if its seed has no line of its own
-std::string make_simulation_provenance(const std::filesystem::path& scene,
-                                       std::optional<std::uint64_t> seed,
-                                       const std::string& program, const std::string& version);
+std::string make_provenance(const std::filesystem::path& scene, std::optional<std::uint64_t> seed,
+                            const std::string& program, const std::string& version);
 
 /// Counts and warnings of a simulation.
 struct SimulationSummary {
-  /// Warnings about useless captures, one line each: find_scene_warnings() for each folder, and
+  /// Warnings about useless captures, one line each: list_scene_warnings() for each folder, and
   /// captures without a lamp or corner in view.
   std::vector<std::string> warnings;
   std::size_t rendered = 0;
@@ -53,9 +52,9 @@ using SimulationProgress = std::function<void(const SimulationSummary& so_far, s
 /// resumed. The bytes depend on the scene alone, not on the number of threads.
 /// @throws InputError if a folder holds something else, or if files cannot be written
 /// @throws std::invalid_argument if the scene lacks a folder, or if the board cannot be printed
-SimulationSummary render_scene_to_folder(const Scene& scene, const std::filesystem::path& output,
-                                         const SimulationOptions& options,
-                                         const SimulationProgress& progress);
+SimulationSummary render_scene(const Scene& scene, const std::filesystem::path& output,
+                               const SimulationOptions& options,
+                               const SimulationProgress& progress);
 
 /// Claims a folder for captures by writing `provenance` as its scene.yaml. Has no effect if the
 /// folder is claimed by the same `provenance` already.
@@ -67,6 +66,6 @@ void claim_output_folder(const std::filesystem::path& output, const std::string&
 ///
 /// Covers images that are nearly black or white, exposures that blur the stripes, and stripes that
 /// are too fine.
-std::vector<std::string> find_scene_warnings(const Scene& scene, const CaptureSet& set);
+std::vector<std::string> list_scene_warnings(const Scene& scene, const CaptureSet& set);
 
 }  // namespace vlp

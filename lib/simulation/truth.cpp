@@ -45,8 +45,7 @@ std::optional<ImagePoint> find_image_point(const FrameRenderer& renderer, const 
     if (!pixel) return std::nullopt;
     if (before && (*pixel - *before).norm() < tolerance_px) return ImagePoint{*pixel, time_s};
     before = pixel;
-    time_s = shutter.line_exposure_center_s(
-        renderer.pixel_rays().convert_pixel_to_readout_order(*pixel)[0]);
+    time_s = shutter.line_center_s(renderer.pixel_rays().to_readout_order(*pixel)[0]);
   }
   return std::nullopt;
 }
@@ -106,7 +105,7 @@ double compute_visible_fraction(const Scene& scene, const FrameRenderer& rendere
                                 const Shutter& shutter, const Motion& camera_from_world,
                                 const Glow& glow, const Mirror* mirror) {
   Eigen::Isometry3d reflection = Eigen::Isometry3d::Identity();
-  if (mirror) reflection = make_reflection_about_panel(mirror->pane);
+  if (mirror) reflection = make_reflection(mirror->pane);
   const auto visible = [&](const Eigen::Vector3d& glow_point_m) {
     const Eigen::Vector3d point_m = reflection * glow_point_m;
     const auto at = find_image_point(renderer, shutter, camera_from_world, point_m);
@@ -137,8 +136,8 @@ std::optional<GlowImage> find_glow_image(const Scene& scene, const FrameRenderer
   Eigen::Vector3d center_m = glow.position_m;
   if (mirror) {
     const Eigen::Vector3d eye_m = shot.motion.world_from_camera(0).translation();
-    if (!are_on_same_side_of_mirror(*mirror, center_m, eye_m)) return std::nullopt;
-    center_m = make_reflection_about_panel(mirror->pane) * center_m;
+    if (!are_on_same_side(*mirror, center_m, eye_m)) return std::nullopt;
+    center_m = make_reflection(mirror->pane) * center_m;
   }
   const Shutter shutter = renderer.make_rolling_shutter(shot.exposure_s);
   const auto center = find_image_point(renderer, shutter, camera_from_world, center_m);
@@ -157,8 +156,8 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
                              const CaptureSet& set, const std::filesystem::path& folder) {
   // Columns that no capture of the set needs are omitted.
   bool moves = false, has_roll_pitch = false;
-  for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const BaseMotion motion = make_lamp_capture_parameters(scene, set, i).motion;
+  for (std::size_t i = 0; i < count_shots(set); ++i) {
+    const BaseMotion motion = make_lamp_shot(scene, set, i).motion;
     moves = moves || !motion.is_base_at_rest();
     has_roll_pitch = has_roll_pitch || !motion.is_base_level();
   }
@@ -176,8 +175,8 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
       known ? std::initializer_list<std::string_view>{"image", "time_s", "x_m", "y_m", "z_m"}
             : std::initializer_list<std::string_view>{"image", "time_s"});
   std::size_t empty = 0;
-  for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const LampShot shot = make_lamp_capture_parameters(scene, set, i);
+  for (std::size_t i = 0; i < count_shots(set); ++i) {
+    const LampShot shot = make_lamp_shot(scene, set, i);
     const auto& [position_m, yaw_rad] = shot.motion.camera_pose_at(0);
     const std::string x = length(position_m.x()), y = length(position_m.y());
     const std::string z = length(position_m.z()), time = format_fixed_decimals(shot.time_s, 9);
@@ -188,7 +187,7 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
                              angle(shot.motion.turn_rate_rad_per_s)});
     }
     if (has_roll_pitch) {
-      const Inclination lean = shot.motion.base_inclination_at(0);
+      const Inclination lean = shot.motion.inclination_at(0);
       row.insert(row.end(), {angle(lean.roll_rad), angle(lean.pitch_rad)});
     }
     truth.write_csv_row(row);
@@ -197,11 +196,11 @@ std::size_t write_lamp_truth(const Scene& scene, const FrameRenderer& renderer,
     } else {
       captures.write_csv_row({shot.image, time});
     }
-    const auto lamps = find_true_lamps_in_image(scene, renderer, shot);
+    const auto lamps = list_true_lamps(scene, renderer, shot);
     empty += lamps.empty();
     for (const auto& [id, at_px, in_view] : lamps) {
       detections.write_csv_row({shot.image, std::to_string(id), pixel(at_px.x()), pixel(at_px.y()),
-                                format_significant_digits(in_view, 3)});
+                                format_digits(in_view, 3)});
     }
   }
   truth.save_file();
@@ -215,12 +214,11 @@ void write_other_lights(const Scene& scene, const FrameRenderer& renderer, const
   if (scene.clutter.mirrors.empty() && scene.clutter.foreign_lights.empty()) return;
   CsvWriter table(folder / "true_other_lights.csv",
                   {"image", "kind", "lamp", "u_px", "v_px", "in_view"});
-  for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const LampShot shot = make_lamp_capture_parameters(scene, set, i);
-    for (const auto& [kind, lamp, at_px, in_view] :
-         find_true_other_lights_in_image(scene, renderer, shot)) {
+  for (std::size_t i = 0; i < count_shots(set); ++i) {
+    const LampShot shot = make_lamp_shot(scene, set, i);
+    for (const auto& [kind, lamp, at_px, in_view] : list_true_lights(scene, renderer, shot)) {
       table.write_csv_row({shot.image, kind, lamp ? std::to_string(*lamp) : "", pixel(at_px.x()),
-                           pixel(at_px.y()), format_significant_digits(in_view, 3)});
+                           pixel(at_px.y()), format_digits(in_view, 3)});
     }
   }
   table.save_file();
@@ -231,11 +229,11 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
   CsvWriter boards(folder / "true_boards.csv",
                    {"image", "x_m", "y_m", "z_m", "rx_rad", "ry_rad", "rz_rad"});
   std::vector<std::string> columns{"image", "tag", "corner", "u_px", "v_px"};
-  if (scene.board->pattern.has_chessboard_squares()) columns.erase(columns.begin() + 1);
+  if (scene.board->pattern.has_squares()) columns.erase(columns.begin() + 1);
   CsvWriter corners(folder / "true_corners.csv", columns);
   std::size_t empty = 0;
-  for (std::size_t i = 0; i < count_captures_of_set(set); ++i) {
-    const BoardShot shot = make_board_capture_parameters(scene, set, i);
+  for (std::size_t i = 0; i < count_shots(set); ++i) {
+    const BoardShot shot = make_board_shot(scene, set, i);
     const Eigen::Isometry3d camera_from_board = shot.camera_from_board(0);
     const Eigen::Vector3d place_m = camera_from_board.translation();
     const Eigen::AngleAxisd rotation(camera_from_board.linear());
@@ -243,7 +241,7 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
     boards.write_csv_row({shot.image, length(place_m.x()), length(place_m.y()), length(place_m.z()),
                           angle(rotation_vector_rad.x()), angle(rotation_vector_rad.y()),
                           angle(rotation_vector_rad.z())});
-    const auto visible_corners = project_scene_corners_into_image(scene, renderer, shot);
+    const auto visible_corners = list_true_corners(scene, renderer, shot);
     empty += visible_corners.empty();
     for (const auto& [tag, corner, at_px] : visible_corners) {
       std::vector<std::string> row{shot.image};
@@ -259,8 +257,8 @@ std::size_t write_board_truth(const Scene& scene, const FrameRenderer& renderer,
 
 }  // namespace
 
-std::vector<TrueLamp> find_true_lamps_in_image(const Scene& scene, const FrameRenderer& renderer,
-                                               const LampShot& shot) {
+std::vector<TrueLamp> list_true_lamps(const Scene& scene, const FrameRenderer& renderer,
+                                      const LampShot& shot) {
   std::vector<TrueLamp> lamps;
   for (const SceneLamp& lamp : scene.lamps) {
     const auto glow_image = find_glow_image(scene, renderer, shot, lamp.glow);
@@ -269,9 +267,8 @@ std::vector<TrueLamp> find_true_lamps_in_image(const Scene& scene, const FrameRe
   return lamps;
 }
 
-std::vector<TrueOtherLight> find_true_other_lights_in_image(const Scene& scene,
-                                                            const FrameRenderer& renderer,
-                                                            const LampShot& shot) {
+std::vector<TrueOtherLight> list_true_lights(const Scene& scene, const FrameRenderer& renderer,
+                                             const LampShot& shot) {
   std::vector<TrueOtherLight> lights;
   for (const Mirror& mirror : scene.clutter.mirrors) {
     for (const SceneLamp& lamp : scene.lamps) {
@@ -289,21 +286,20 @@ std::vector<TrueOtherLight> find_true_other_lights_in_image(const Scene& scene,
   return lights;
 }
 
-std::vector<TrueCorner> project_scene_corners_into_image(const Scene& scene,
-                                                         const FrameRenderer& renderer,
-                                                         const BoardShot& shot) {
+std::vector<TrueCorner> list_true_corners(const Scene& scene, const FrameRenderer& renderer,
+                                          const BoardShot& shot) {
   const BoardWarp warp(*scene.board);
   const auto camera_from_board = [&](double time_s) { return shot.camera_from_board(time_s); };
   std::vector<TrueCorner> corners;
   const auto add = [&](std::optional<int> tag, int corner, const Eigen::Vector2d& at_m) {
-    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), warp.compute_board_deflection(at_m).depth_m);
+    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), warp.deflect(at_m).depth_m);
     const auto at = find_image_point(renderer, renderer.make_rolling_shutter(shot.exposure_s),
                                      camera_from_board, point_m);
     if (at && is_in_image(scene.camera, at->pixel)) corners.push_back({tag, corner, at->pixel});
   };
   const Board& print = scene.board->pattern;
-  if (print.has_chessboard_squares()) {
-    const auto corners_m = list_chessboard_corners_m(print);
+  if (print.has_squares()) {
+    const auto corners_m = list_inner_corners_m(print);
     for (std::size_t i = 0; i < corners_m.size(); ++i) add({}, static_cast<int>(i), corners_m[i]);
     return corners;
   }
@@ -328,7 +324,7 @@ Calibration make_true_calibration(const Scene& scene) {
   return calibration;
 }
 
-LampMap make_scene_lamp_map(const Scene& scene, bool surveyed) {
+LampMap make_lamp_map(const Scene& scene, bool surveyed) {
   LampMap map;
   for (const SceneLamp& lamp : scene.lamps) {
     Eigen::Vector3d position_m = lamp.glow.position_m;

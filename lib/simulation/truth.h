@@ -26,8 +26,8 @@ struct TrueLamp {
 
 /// Returns the lamps that are at least partly in view and whose center the lens describes. The
 /// center may lie outside the image.
-std::vector<TrueLamp> find_true_lamps_in_image(const Scene& scene, const FrameRenderer& renderer,
-                                               const LampShot& shot);
+std::vector<TrueLamp> list_true_lamps(const Scene& scene, const FrameRenderer& renderer,
+                                      const LampShot& shot);
 
 /// Flickering light that is not one of the lamps, as it appears in a capture.
 struct TrueOtherLight {
@@ -45,12 +45,11 @@ struct TrueOtherLight {
 
 /// Returns the mirror images and foreign lights that are at least partly in view and whose center
 /// the lens describes.
-std::vector<TrueOtherLight> find_true_other_lights_in_image(const Scene& scene,
-                                                            const FrameRenderer& renderer,
-                                                            const LampShot& shot);
+std::vector<TrueOtherLight> list_true_lights(const Scene& scene, const FrameRenderer& renderer,
+                                             const LampShot& shot);
 
 /// Corner of a tag's black border as it appears in a capture, in the order of BoardTag. For a board
-/// of squares without tags: an inner corner, numbered as in list_chessboard_corners_m().
+/// of squares without tags: an inner corner, numbered as in list_inner_corners_m().
 struct TrueCorner {
   std::optional<int> tag;
   int corner;
@@ -58,15 +57,14 @@ struct TrueCorner {
 };
 
 /// Returns the corners inside the image.
-std::vector<TrueCorner> project_scene_corners_into_image(const Scene& scene,
-                                                         const FrameRenderer& renderer,
-                                                         const BoardShot& shot);
+std::vector<TrueCorner> list_true_corners(const Scene& scene, const FrameRenderer& renderer,
+                                          const BoardShot& shot);
 
 /// Returns the scene's camera, with its tilt as the rotation center.
 Calibration make_true_calibration(const Scene& scene);
 
 /// Returns the lamp map with map errors (`surveyed` true), or with the true positions.
-LampMap make_scene_lamp_map(const Scene& scene, bool surveyed);
+LampMap make_lamp_map(const Scene& scene, bool surveyed);
 
 /// Writes the ground truth of a set into `folder`.
 ///   Lamps: truth.csv, true_detections.csv (with the fraction in view), captures.csv and, for a

@@ -40,7 +40,7 @@ Parts parse_parts(const std::string& where) {
 }
 
 /// Returns true if a part of the password could be interpreted as host or database.
-bool may_password_be_misread(const std::string& where, const Parts& parts) {
+bool may_be_misread(const std::string& where, const Parts& parts) {
   const std::string without_parameters = where.substr(0, where.find('?'));
   const auto begin = without_parameters.find(kScheme) + std::string(kScheme).size();
   const auto slash = std::min(without_parameters.find('/', begin), without_parameters.size());
@@ -55,7 +55,7 @@ bool may_password_be_misread(const std::string& where, const Parts& parts) {
 }
 
 /// Returns true for a connection string of keywords, as of libpq's own tools.
-bool is_keyword_connection_string(const std::string& where) {
+bool is_keyword_string(const std::string& where) {
   return where.find("password=") != std::string::npos || where.find("host=") != std::string::npos ||
          where.find("dbname=") != std::string::npos;
 }
@@ -74,12 +74,12 @@ std::string get_host_name() {
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "";
 }
 
-bool is_database_server_address(const std::string& where) {
+bool is_server_address(const std::string& where) {
   return where.find(kScheme) != std::string::npos;
 }
 
-bool contains_database_password(const std::string& where) {
-  if (!is_database_server_address(where)) return false;
+bool contains_password(const std::string& where) {
+  if (!is_server_address(where)) return false;
   PQconninfoOption* options = PQconninfoParse(where.c_str(), nullptr);
   const std::unique_ptr<PQconninfoOption, decltype(&PQconninfoFree)> owned(options, PQconninfoFree);
   for (; options != nullptr && options->keyword != nullptr; ++options) {
@@ -97,24 +97,23 @@ bool contains_database_password(const std::string& where) {
 
 std::string describe_database(const std::string& where) {
   const std::string form = "is not of the form postgresql://USER@HOST/NAME";
-  if (!is_database_server_address(where)) {
-    if (is_keyword_connection_string(where))
-      throw InputError("a connection string of keywords", form);
+  if (!is_server_address(where)) {
+    if (is_keyword_string(where)) throw InputError("a connection string of keywords", form);
     return where;
   }
   const std::string hidden = where.substr(0, where.find(kScheme)) + kScheme + "...";
   auto parts = parse_parts(where);
   if (parts.empty()) throw InputError(hidden, form);
-  if (may_password_be_misread(where, parts)) {
+  if (may_be_misread(where, parts)) {
     throw InputError(hidden, form + "; in user and password '@' is %40, ':' is %3A, '/' is %2F");
   }
   const std::string port = parts.contains("port") ? ":" + parts["port"] : "";
   return "postgresql://" + parts["host"] + port + "/" + parts["dbname"];
 }
 
-std::string derive_database_identity(const std::string& where) {
+std::string derive_identity(const std::string& where) {
   const std::string name = describe_database(where);
-  if (!is_database_server_address(where)) {
+  if (!is_server_address(where)) {
     return get_host_name() + ":" + std::filesystem::absolute(name).lexically_normal().string();
   }
   Parts parts = parse_parts(where);
@@ -130,7 +129,7 @@ std::string derive_database_identity(const std::string& where) {
          stated("service", " of the service ");
 }
 
-std::string make_soci_connection_string_from_address(const std::string& where) {
+std::string make_soci_string(const std::string& where) {
   std::string connection;
   for (const char c : where) {
     if (c == ' ') {
@@ -148,15 +147,15 @@ std::string make_soci_connection_string_from_address(const std::string& where) {
       .append(std::to_string(kPatience_s));
 }
 
-bool is_database_server_responding(const std::string& where) {
-  const std::string connection = make_soci_connection_string_from_address(where);
+bool is_server_responding(const std::string& where) {
+  const std::string connection = make_soci_string(where);
   const std::array keywords{"dbname", "sslmode", kPatience, static_cast<const char*>(nullptr)};
   const std::array values{connection.c_str(), "prefer", "2", static_cast<const char*>(nullptr)};
   return PQpingParams(keywords.data(), values.data(), 1) == PQPING_OK;
 }
 
-int get_database_timeout_s(const std::string& where) {
-  if (!is_database_server_address(where)) return kPatienceWithFile_s;
+int get_timeout_s(const std::string& where) {
+  if (!is_server_address(where)) return kPatienceWithFile_s;
   const auto parts = parse_parts(where);
   const auto without_parameters = parts.find(kPatience);
   if (without_parameters == parts.end()) return kPatience_s;

@@ -61,8 +61,7 @@ class CountedIterator {
 };
 
 /// Returns the reason why a serial does not match a pattern; empty if it does.
-std::string describe_serial_pattern_mismatch(const std::string& serial,
-                                             const std::string& pattern) {
+std::string describe_pattern_mismatch(const std::string& serial, const std::string& pattern) {
   long steps = 0;
   const CountedIterator begin(serial.data(), &steps), end(serial.data() + serial.size(), &steps);
   try {
@@ -83,7 +82,7 @@ struct Files {
   std::string& digests;
 
   void add(const fs::path& file) const {
-    digests += compute_file_sha256(file) + "\n";
+    digests += hash_file(file) + "\n";
     names.push_back(file);
   }
   fs::path operator()(const YamlValue& value) const {
@@ -108,16 +107,16 @@ struct Files {
   }
   void operator()(const YamlValue& value, Board& board) const {
     board = read_board((*this)(value));
-    if (board.has_chessboard_squares())
+    if (board.has_squares())
       throw value.make_error("is a board of squares: the station looks for one of AprilTags");
   }
 };
 
 /// Reads a database: a file relative to the station, or a server.
-std::string read_records_address(const YamlValue& value, const Files& files) {
+std::string read_address(const YamlValue& value, const Files& files) {
   const std::string where = value.read_text();
   if (where.starts_with("postgresql://") || where.starts_with("postgres://")) return where;
-  if (is_database_server_address(where))
+  if (is_server_address(where))
     throw value.make_error("should name a file, or be postgresql://...");
   describe_database(where);  // checks the name of a file
   fs::path file;
@@ -178,7 +177,7 @@ static void describe_rejection(YamlMap& io, StationConfig& config) {
 }
 
 /// Describes guard bands of gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
-static void describe_guard_bands(YamlMap& io, StationConfig& config) {
+static void describe_bands(YamlMap& io, StationConfig& config) {
   double k = 0;
   io.required("k", k, Range{0, 10, "(factor)"});
   YamlMap uncertainties = io.require("standard_uncertainties").read_mapping();
@@ -187,12 +186,11 @@ static void describe_guard_bands(YamlMap& io, StationConfig& config) {
 
 static void describe(YamlMap& io, GoldenUnit& golden, const Files& files) {
   io.required("camera_id", golden.camera_id)
-      .check(Id::is_valid_name_of_camera_or_run(golden.camera_id),
-             "is no id of a camera: it names a folder");
+      .check(Id::is_valid(golden.camera_id), "is no id of a camera: it names a folder");
   io.required("calibration", golden.calibration, files)
       .check(golden.calibration.rotation_center.has_value(),
              "should be a complete calibration: it has no rotation_center");
-  golden.gates = read_gates(io.require("gates"), list_unit_metric_kinds());
+  golden.gates = read_gates(io.require("gates"), list_unit_metrics());
 }
 
 static void describe(YamlMap& io, VerificationInterval& due) {
@@ -221,7 +219,7 @@ static void describe(YamlMap& io, Hook& hook, const Files& files) {
 }
 
 /// Describes the camera type and the targets that it observes: board, lamps and known position.
-static void describe_camera_and_targets(YamlMap& io, StationConfig& config, const Files& files) {
+static void describe_targets(YamlMap& io, StationConfig& config, const Files& files) {
   Calibration type;
   io.required("camera_type", type, files);
   config.nominal_camera = type.camera;
@@ -229,7 +227,7 @@ static void describe_camera_and_targets(YamlMap& io, StationConfig& config, cons
   io.required("board", config.board, files);
   std::string room;
   io.optional("room", room);
-  config.lamps = read_overhead_lamps_of_room(files(io.require("lamps")), room);
+  config.lamps = read_overhead_lamps(files(io.require("lamps")), room);
   io.optional("dispersion_position_m", config.dispersion_position_m);
 }
 
@@ -237,8 +235,8 @@ static void describe_camera_and_targets(YamlMap& io, StationConfig& config, cons
 static void describe_verdict(YamlMap& io, StationConfig& config, const Files& files) {
   io.optional("completion", config.completion);
   io.optional("rejection", config, describe_rejection);
-  config.gates = read_gates(io.require("gates"), list_unit_metric_kinds());
-  io.optional("guard_bands", config, describe_guard_bands);
+  config.gates = read_gates(io.require("gates"), list_unit_metrics());
+  io.optional("guard_bands", config, describe_bands);
   io.optional("golden", config.golden_unit, files);
   io.optional("verify_due", config.verification_interval)
       .check(config.golden_unit.has_value(), "needs a golden unit: add the key 'golden'");
@@ -246,7 +244,7 @@ static void describe_verdict(YamlMap& io, StationConfig& config, const Files& fi
 
 static void describe(YamlMap& io, StationConfig& config, const Files& files) {
   io.required("station", config.station);
-  describe_camera_and_targets(io, config, files);
+  describe_targets(io, config, files);
   describe_verdict(io, config, files);
   const YamlField pattern = io.optional("serial_pattern", config.serial_pattern);
   check_pattern(config.serial_pattern, pattern);
@@ -254,7 +252,7 @@ static void describe(YamlMap& io, StationConfig& config, const Files& files) {
       .check(!config.void_operators.empty(), "names nobody; leave it out if all may void runs");
   io.required("captures", config.captures, files);
   io.required("results", config.results, files);
-  config.records = read_records_address(io.require("records"), files);
+  config.records = read_address(io.require("records"), files);
   config.spool = config.file.parent_path() / "spool";
   io.optional("spool", config.spool, files);
   io.optional("retention", config.retention);
@@ -266,13 +264,13 @@ std::string describe_camera_id_problem(const std::string& camera_id) {
   return "a camera's id has letters, digits, '-', '_' and '.', up to 64, no '.' first";
 }
 
-std::string describe_serial_number_problem(const StationConfig& config, const std::string& serial) {
+std::string describe_serial_problem(const StationConfig& config, const std::string& serial) {
   std::string problem = describe_camera_id_problem(serial);
   if (!problem.empty() || config.serial_pattern.empty()) return problem;
-  return describe_serial_pattern_mismatch(serial, config.serial_pattern);
+  return describe_pattern_mismatch(serial, config.serial_pattern);
 }
 
-std::vector<MetricKind> list_unit_metric_kinds() {
+std::vector<MetricKind> list_unit_metrics() {
   return list_metric_kinds({MetricSource::station, MetricSource::lens, MetricSource::rotation,
                             MetricSource::dispersion});
 }
@@ -291,7 +289,7 @@ StationConfig read_station_config(const fs::path& file) {
     throw InputError(
         file, "no lamp of the map has a frequency_hz, which is needed to identify lamps; add it");
   }
-  config.sha256 = compute_text_sha256(digests);
+  config.sha256 = hash_text(digests);
   return config;
 }
 

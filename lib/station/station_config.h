@@ -114,10 +114,10 @@ std::string describe_camera_id_problem(const std::string& camera_id);
 
 /// Returns the reason why a text is no valid serial of a unit of the station; empty if it is valid.
 /// A serial names folders. Comparing it with `serial_pattern` must not take too long.
-std::string describe_serial_number_problem(const StationConfig& config, const std::string& serial);
+std::string describe_serial_problem(const StationConfig& config, const std::string& serial);
 
 /// Returns the metrics of a unit, including all metrics that its gates can limit.
-std::vector<MetricKind> list_unit_metric_kinds();
+std::vector<MetricKind> list_unit_metrics();
 
 /// Reads a station's configuration.
 ///

@@ -17,7 +17,7 @@ void create_station_folder(const fs::path& folder) {
   if (error) throw InputError(folder, "cannot be made: " + error.message());
 }
 
-void require_writable_folder_with_space(const SharedFolder& folder, std::uintmax_t bytes) {
+void require_space(const SharedFolder& folder, std::uintmax_t bytes) {
   constexpr double megabyte = 1e6;
   std::error_code error;
   const fs::space_info space = fs::space(folder.folder_path(), error);
@@ -28,7 +28,7 @@ void require_writable_folder_with_space(const SharedFolder& folder, std::uintmax
                                  double(space.available) / megabyte, double(bytes) / megabyte));
   }
   constexpr const char* probe = ".writable";
-  folder.replace_file_atomically(probe, "results can be written here\n");
+  folder.replace_file(probe, "results can be written here\n");
   folder.remove_file(probe);
 }
 

@@ -14,6 +14,6 @@ void create_station_folder(const std::filesystem::path& folder);
 
 /// Checks, before a unit is started, that a folder is writable and has `bytes` bytes of free space.
 /// @throws InputError if it is not writable or has less space
-void require_writable_folder_with_space(const SharedFolder& folder, std::uintmax_t bytes);
+void require_space(const SharedFolder& folder, std::uintmax_t bytes);
 
 }  // namespace vlp

@@ -162,13 +162,11 @@ bool compare(const Case& test_case, int num_repetitions) {
   }
   const ProjectionUncertainty uncertainty(solution);
   const auto known = [&](const Eigen::Vector2d& pixel) {
-    return uncertainty.projection_sd_along_worst_direction_px(pixel) <= test_case.known_px
-               ? 1.0
-               : INFINITY;
+    return uncertainty.worst_direction_sd_px(pixel) <= test_case.known_px ? 1.0 : INFINITY;
   };
   const auto difference =
-      compute_projection_difference(read_lens(model.str(), test_case.input.lens_model),
-                                    solution.fitted_lens(), test_case.input.imager_px, known);
+      compare_projections(read_lens(model.str(), test_case.input.lens_model),
+                          solution.fitted_lens(), test_case.input.imager_px, known);
   if (!difference) {
     fmt::print("{}: the lenses share no place\n", test_case.name);
     return false;
@@ -202,7 +200,7 @@ int compare() {
                0.05,
                0.001,
                0};
-  splined.input.lens_model = lens_model_for_spline_grid({3, 14, 14, 205});
+  splined.input.lens_model = splined_lens_model({3, 14, 14, 205});
   splined.input.warp = WarpChoice::on;
   const bool plain_good = compare(plain, 10), splined_good = compare(splined, 1);
   return plain_good && splined_good ? 0 : 1;

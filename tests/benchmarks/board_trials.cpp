@@ -83,16 +83,15 @@ cv::Mat developed(const Scene& scene, const cv::Mat1f& electrons, std::uint64_t 
                   const std::optional<ImageProcessing>& picture) {
   cv::Mat image = simulate_sensor_image(scene.sensor, electrons, seed, picture);
   if (scene.camera.readout == Readout::columns) image = image.t();  // lines are columns
-  return cv::imdecode(encode_image_as_jpeg_or_png(image, picture),
-                      cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
+  return cv::imdecode(encode_image(image, picture), cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
 /// Difference over the pixels of a region, after rotating the lenses to the best agreement over the
 /// image.
 double worst_within(const ImageRegion& region, const Lens& truth, const Lens& lens,
                     const std::array<int, 2>& imager_px) {
-  const auto pixels = make_regular_pixel_grid(imager_px);
-  const auto turned = fit_rotation_between_lenses(truth, lens, pixels);
+  const auto pixels = make_pixel_grid(imager_px);
+  const auto turned = fit_lens_rotation(truth, lens, pixels);
   double worst_px = 0;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = truth.unproject_pixel(pixel);
@@ -111,13 +110,13 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
   input.camera = scene.camera;
   input.observations.images.resize(electrons.size());
   const auto threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
-  const double holds_e = std::min(scene.sensor.full_well_e, (sensor_white_level_dn(scene.sensor) -
-                                                             scene.sensor.black_level_dn) /
-                                                                scene.sensor.gain_dn_per_e);
+  const double holds_e = std::min(
+      scene.sensor.full_well_e,
+      (white_level_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e);
   const double white_e = scene.board->white_e_per_s * boards.exposure_s;
   const double exposures = development.white > 0 ? development.white * holds_e / white_e : 1;
   parallel_for(electrons.size(), threads, [&](std::size_t i) {
-    const BoardShot shot = make_board_capture_parameters(scene, boards, i);
+    const BoardShot shot = make_board_shot(scene, boards, i);
     cv::Mat1f lit;
     electrons[i].convertTo(lit, CV_32F, exposures);
     const cv::Mat image = developed(scene, lit, shot.noise_seed, development.picture);
@@ -125,16 +124,16 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
         observed({shot.image, {image.cols, image.rows}, detector.detect_board(image)});
   });
   std::size_t tags = 0, usable = 0;
-  for (const BoardView& view : collect_board_views_of_kept_images(input.observations.images)) {
+  for (const BoardView& view : collect_board_views(input.observations.images)) {
     usable += view.detection.tags.size();
     tags += view.detection.tags.size() + static_cast<std::size_t>(view.detection.num_unusable_tags);
   }
   const BoardLattice lattice(input.board);
   for (Observation& image : input.observations.images) {
-    if (lattice.are_corners_sufficient_for_pose(image.board->detection)) continue;
-    image.set_image_rejection(RejectionReason::too_few_corners, "shows too little of the board");
+    if (lattice.can_determine_pose(image.board->detection)) continue;
+    image.reject(RejectionReason::too_few_corners, "shows too little of the board");
   }
-  const LensResult result = run_lens_calibration_step(input, {});
+  const LensResult result = run_lens_step(input, {});
   const std::string detected_percent =
       fmt::format("{:.1f}", 100 * static_cast<double>(usable) / static_cast<double>(tags));
   if (!result.has_succeeded()) {
@@ -144,7 +143,7 @@ void try_development(Scene scene, const CaptureSet& boards, const std::vector<cv
   const Camera& camera = scene.camera;
   const Lens truth(camera.lens_model, camera.intrinsics), lens = result.lens.solution.fitted_lens();
   const auto even = [](const Eigen::Vector2d&) { return 1; };
-  const auto difference = compute_projection_difference(truth, lens, camera.imager_px, even);
+  const auto difference = compare_projections(truth, lens, camera.imager_px, even);
   fmt::print(
       "{:48} {:.4f} / {:.3f} px, in the region {:.3f}; {:.2f} x stated rms, worst stated {:.3f}, "
       "{:.3f} "
@@ -164,12 +163,11 @@ void try_seed(Scene scene, std::uint64_t seed, int views, const std::string& wan
   if (views > 0) boards.board->count = views;
   const FrameRenderer renderer(scene);
   const BoardDetector detector(scene.board->pattern);
-  std::vector<cv::Mat1f> electrons(count_captures_of_set(boards));
-  parallel_for(
-      electrons.size(), static_cast<int>(std::thread::hardware_concurrency()), [&](std::size_t i) {
-        electrons[i] =
-            renderer.render_board_in_electrons(make_board_capture_parameters(scene, boards, i));
-      });
+  std::vector<cv::Mat1f> electrons(count_shots(boards));
+  parallel_for(electrons.size(), static_cast<int>(std::thread::hardware_concurrency()),
+               [&](std::size_t i) {
+                 electrons[i] = renderer.render_board(make_board_shot(scene, boards, i));
+               });
   fmt::print("seed {}, {} views\n", seed, electrons.size());
   for (const Development& development : developments()) {
     if (development.name.find(wanted) == std::string::npos) continue;

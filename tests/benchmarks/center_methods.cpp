@@ -65,7 +65,7 @@ LitPixels find_lit_pixels(const cv::Mat& image, const Light& light) {
   const cv::Point high(int(std::ceil(light.box.max().x())) + around_px + 1,
                        int(std::ceil(light.box.max().y())) + around_px + 1);
   const cv::Rect box = cv::Rect(low, high) & cv::Rect({0, 0}, image.size());
-  const Background background = estimate_image_background(to_image_view(image));
+  const Background background = estimate_background_of(to_image_view(image));
   return image.depth() == CV_8U ? find_lit_pixels<std::uint8_t>(image, background, box)
                                 : find_lit_pixels<std::uint16_t>(image, background, box);
 }
@@ -81,9 +81,9 @@ std::map<int, Light> lamps_in(const LightDetector& detector, const cv::Mat& imag
 /// Lamps completely in view, by image.
 std::map<std::string, std::map<int, Vector2d>> truth_in(const std::filesystem::path& folder) {
   const CsvTable table(folder / "true_detections.csv");
-  const auto image = table.get_required_column("image"), lamp = table.get_required_column("lamp");
-  const auto u = table.get_required_column("u_px"), v = table.get_required_column("v_px");
-  const auto in_view = table.get_required_column("in_view");
+  const auto image = table.require_column("image"), lamp = table.require_column("lamp");
+  const auto u = table.require_column("u_px"), v = table.require_column("v_px");
+  const auto in_view = table.require_column("in_view");
   std::map<std::string, std::map<int, Vector2d>> truth;
   for (std::size_t row = 0; row < table.num_rows(); ++row) {
     if (table.get_cell_number(row, in_view) < 1) continue;

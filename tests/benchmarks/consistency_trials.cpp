@@ -225,7 +225,7 @@ Trial make_trial(const StepResult& result) {
 }
 
 void add_center_errors(Trial& trial, const Calibration& found, const RotationCenter& truth) {
-  const auto covariance_px2 = compute_rotation_center_covariance(found);
+  const auto covariance_px2 = compute_center_covariance(found);
   if (!covariance_px2) return;
   trial.errors.push_back(
       normalize(found.rotation_center->center_px - truth.center_px, *covariance_px2));
@@ -243,15 +243,14 @@ void add_lever_arm_errors(Trial& trial, const Calibration& found, const Eigen::V
 Trial try_rotation(const Cell& cell, Random& random, RotationMethod method, double tilt_rad,
                    const Turn& turn) {
   Room room(cell, tilt_rad, random);
-  LampCaptures input{
-      {}, room.surveyed_map(), {}, extract_camera_only_calibration(room.calibration())};
+  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera(room.calibration())};
   for (std::size_t height = 0; height < turn.heights_m.size(); ++height) {
     for (int k = 0; k < cell.captures; ++k) {
       const Pose pose = turn.pose(height, room.draw_yaw(k));
       input.frames.push_back({std::to_string(input.frames.size()), room.draw_detections(pose)});
     }
   }
-  const RotationResult result = run_rotation_calibration_step(input, method, {});
+  const RotationResult result = run_rotation_step(input, method, {});
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   add_center_errors(trial, result.calibration, room.center());
@@ -273,12 +272,11 @@ Trial try_axis(const Cell& cell, Random& random) {
 
 Trial try_lamps(const Cell& cell, Random& random) {
   Room room(cell, kTilt_rad, random);
-  LampCaptures input{
-      {}, room.surveyed_map(), {}, extract_camera_only_calibration(room.calibration())};
+  LampCaptures input{{}, room.surveyed_map(), {}, extract_camera(room.calibration())};
   for (int k = 0; k < cell.captures; ++k) {
     input.frames.push_back({std::to_string(k), room.draw_detections(room.draw_pose(k))});
   }
-  const TiltResult result = run_tilt_calibration_step(input, false, {});
+  const TiltResult result = run_tilt_step(input, false, {});
   Trial trial = make_trial(result);
   if (trial.has_result) add_center_errors(trial, result.calibration, room.center());
   return trial;
@@ -306,12 +304,12 @@ Trial try_dispersion(const Cell& cell, Random& random, DispersionMethod method) 
     input.frames.push_back({std::to_string(k), places.captures.back().detections});
   }
   const DispersionResult result =
-      run_dispersion_calibration_step(input, places, method, DispersionCircle::mean, {});
+      run_dispersion_step(input, places, method, DispersionCircle::mean, {});
   Trial trial = make_trial(result);
-  const DispersionFit truth = estimate_dispersion_offset(exact, room.true_map(), believed, method);
+  const DispersionFit truth = estimate_dispersion(exact, room.true_map(), believed, method);
   if (!trial.has_result || truth.status != DispersionStatus::ok) return trial;
   const Dispersion& found = result.fit.dispersion;
-  const auto covariance_px2 = compute_dispersion_offset_covariance(result.calibration);
+  const auto covariance_px2 = compute_offset_covariance(result.calibration);
   if (!covariance_px2) return trial;
   trial.errors.push_back(normalize(found.offset_px - truth.dispersion.offset_px, *covariance_px2));
   return trial;
@@ -331,7 +329,7 @@ Trial try_adjustment(const Cell& cell, Random& random) {
   Room room(cell, kTilt_rad, random);
   AdjustStepInput input;
   input.lamps = room.surveyed_map();
-  input.calibration = extract_camera_only_calibration(room.calibration());
+  input.calibration = extract_camera(room.calibration());
   AdjustSet set{.name = "turns", .frames = {}, .captures = {}};
   for (std::size_t height = 0; height < turn.heights_m.size(); ++height) {
     Capture measured;
@@ -349,7 +347,7 @@ Trial try_adjustment(const Cell& cell, Random& random) {
     }
   }
   input.sets.push_back(std::move(set));
-  const AdjustStepResult result = run_joint_adjustment_step(input, {});
+  const AdjustStepResult result = run_adjust_step(input, {});
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   add_center_errors(trial, result.calibration, room.center());
@@ -369,7 +367,7 @@ Trial try_fixes(const Cell& cell, Random& random) {
     truth.push_back(room.draw_pose(k));
     input.frames.push_back({std::to_string(k), room.draw_detections(truth.back())});
   }
-  const LocateResult result = locate_camera_from_detections(input);
+  const LocateResult result = locate_from_detections(input);
   Trial trial = make_trial(result);
   if (!trial.has_result) return trial;
   trial.errors.resize(3);

@@ -24,17 +24,17 @@ struct Captures {
     cv::setNumThreads(1);
     scene.lamps.resize(4);
     const FrameRenderer renderer(scene);
-    const LampShot shot = make_lamp_capture_parameters(scene, scene.sets.at(0), 0);
-    frame = simulate_sensor_image(scene.sensor, renderer.render_lamps_in_electrons(shot), 1);
+    const LampShot shot = make_lamp_shot(scene, scene.sets.at(0), 0);
+    frame = simulate_sensor_image(scene.sensor, renderer.render_lamps(shot), 1);
     scene.lamps.clear();
     const cv::Mat dark = simulate_sensor_image(
-        scene.sensor, FrameRenderer(scene).render_lamps_in_electrons(shot), shot.noise_seed);
+        scene.sensor, FrameRenderer(scene).render_lamps(shot), shot.noise_seed);
     large = cv::repeat(dark, 8, 10)(cv::Rect(0, 0, 7712, 4352)).clone();
     frame.copyTo(large(cv::Rect(3456, 1876, frame.cols, frame.rows)));
     turned = large.t();
   }
   Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
-  const LampMap lamps = make_scene_lamp_map(scene, true);
+  const LampMap lamps = make_lamp_map(scene, true);
   cv::Mat frame, large, turned;
 };
 
@@ -68,7 +68,7 @@ void detect_sample(benchmark::State& state) {
 }
 
 void opencv_components(benchmark::State& state) {
-  const double threshold = estimate_image_background(to_image_view(captures().frame)).threshold;
+  const double threshold = estimate_background_of(to_image_view(captures().frame)).threshold;
   cv::Mat binary, labels, statistics, centroids;
   for (auto _ : state) {
     cv::threshold(captures().frame, binary, threshold, 255, cv::THRESH_BINARY);

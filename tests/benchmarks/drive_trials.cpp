@@ -124,7 +124,7 @@ class Trials {
   void run_leaning(int captures) {
     const FrameRenderer renderer(scene_);
     const Calibration calibration = make_true_calibration(scene_);
-    const LampMap lamps = make_scene_lamp_map(scene_, false);
+    const LampMap lamps = make_lamp_map(scene_, false);
     const LightDetector detector(lamps, make_detector_camera(calibration));
     const Positioner positioner(lamps, calibration);
     Sensors in_hand;
@@ -133,8 +133,8 @@ class Trials {
       Random random(72);
       Errors errors, again;
       for (int i = 0; i < captures; ++i) {
-        LampShot shot = make_lamp_capture_parameters(scene_, scene_.sets.at(0),
-                                                     static_cast<std::size_t>(i) % kShots);
+        LampShot shot =
+            make_lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % kShots);
         BaseMotion& motion = shot.motion;
         motion.axis_m = {random.uniform(-0.5, 0.5), random.uniform(-0.3, 0.3), 0};
         motion.yaw_rad = random.uniform(-3.1, 3.1);
@@ -164,7 +164,7 @@ class Trials {
   void run(int captures) {
     const FrameRenderer renderer(scene_);
     const Calibration calibration = make_true_calibration(scene_);
-    const LampMap lamps = make_scene_lamp_map(scene_, false);
+    const LampMap lamps = make_lamp_map(scene_, false);
     const LightDetector detector(lamps, make_detector_camera(calibration));
     const Positioner positioner(lamps, calibration);
     Errors standing;
@@ -175,8 +175,8 @@ class Trials {
       CenterErrors centers;
       std::vector<DrivenCapture> captures_seen;
       for (int i = 0; i < captures; ++i) {
-        LampShot shot = make_lamp_capture_parameters(scene_, scene_.sets.at(0),
-                                                     static_cast<std::size_t>(i) % kShots);
+        LampShot shot =
+            make_lamp_shot(scene_, scene_.sets.at(0), static_cast<std::size_t>(i) % kShots);
         BaseMotion& motion = shot.motion;
         motion.axis_m.x() = random.uniform(-0.3, 0.3);
         motion.axis_m.y() = random.uniform(-0.12, 0.12);
@@ -201,7 +201,7 @@ class Trials {
           seen.lamps_m.push_back(find_lamp_by_id(lamps.lamps, detection.lamp)->position_m);
         }
         captures_seen.push_back(std::move(seen));
-        for (const TrueLamp& lamp : find_true_lamps_in_image(scene_, renderer, shot)) {
+        for (const TrueLamp& lamp : list_true_lamps(scene_, renderer, shot)) {
           for (const Detection& detection : detections) {
             if (detection.lamp != lamp.id || lamp.visible_fraction < 1) continue;
             centers.add(detection.pixel - lamp.pixel, image_motion);
@@ -290,8 +290,8 @@ class Trials {
 
   std::vector<Detection> detections_in(const FrameRenderer& renderer, const LightDetector& detector,
                                        const LampShot& shot) const {
-    const cv::Mat image = simulate_sensor_image(
-        scene_.sensor, renderer.render_lamps_in_electrons(shot), shot.noise_seed);
+    const cv::Mat image =
+        simulate_sensor_image(scene_.sensor, renderer.render_lamps(shot), shot.noise_seed);
     std::vector<Detection> detections;
     for (const Light& light : detector.detect_lights(to_image_view(image))) {
       if (light.kind == LightKind::lamp) {

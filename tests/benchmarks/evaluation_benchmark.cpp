@@ -78,7 +78,7 @@ void evaluate_fixes(benchmark::State& state) {
   input.fixes = {tables.fixes, read_fixes(tables.fixes)};
   input.truth = FileRows<TruthRow>{tables.truth, read_truth_table(tables.truth)};
   input.threads = 2;
-  for (auto _ : state) benchmark::DoNotOptimize(evaluate_fix_accuracy(input));
+  for (auto _ : state) benchmark::DoNotOptimize(evaluate_fixes(input));
 }
 BENCHMARK(evaluate_fixes)->Apply(arguments);
 

@@ -46,11 +46,11 @@ std::vector<Light> detect_lights(const LightDetector& detector, const cv::Mat& i
 
 /// Returns the image of a shot as read from a file: gray, rows from the top.
 cv::Mat render_image(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot) {
-  cv::Mat image = simulate_sensor_image(scene.sensor, renderer.render_lamps_in_electrons(shot),
-                                        shot.noise_seed, scene.processing);
+  cv::Mat image = simulate_sensor_image(scene.sensor, renderer.render_lamps(shot), shot.noise_seed,
+                                        scene.processing);
   if (scene.camera.readout == Readout::columns) image = image.t();
   if (!scene.processing) return image;
-  return cv::imdecode(encode_image_as_jpeg_or_png(image, scene.processing),
+  return cv::imdecode(encode_image(image, scene.processing),
                       cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
 }
 
@@ -67,7 +67,7 @@ std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector
   constexpr int steps = 60;
   Glow rim = lamp;
   rim.halo.reset();
-  if (!lamp.recess) return compute_object_outline_points(rim);
+  if (!lamp.recess) return list_outline_points(rim);
   const double radius_m = lamp.glow_radius_m();
   std::vector<std::pair<double, Eigen::Vector3d>> fractions_at_points;
   double greatest = 0;
@@ -76,7 +76,7 @@ std::vector<Eigen::Vector3d> bright_points(const Glow& lamp, const Eigen::Vector
                                                             2 * (i / steps + 0.5) / steps - 1);
     if (at_m.norm() > radius_m) continue;
     const double radiance_fraction =
-        compute_downlight_relative_radiance(*lamp.recess, radius_m, eye_m - lamp.position_m, at_m);
+        compute_relative_radiance(*lamp.recess, radius_m, eye_m - lamp.position_m, at_m);
     fractions_at_points.emplace_back(radiance_fraction,
                                      lamp.position_m + Eigen::Vector3d(at_m.x(), at_m.y(), 0));
     greatest = std::max(greatest, radiance_fraction);
@@ -95,7 +95,7 @@ Extent compute_extent(const Scene& scene, const FrameRenderer& renderer, const L
   double radius_px = 0, first_line = INFINITY, last_line = -INFINITY;
   Glow rim = lamp.glow;
   rim.halo.reset();
-  for (const Eigen::Vector3d& point_m : compute_object_outline_points(rim)) {
+  for (const Eigen::Vector3d& point_m : list_outline_points(rim)) {
     const auto pixel = lens.project_point(camera_from_world * point_m);
     if (pixel) radius_px = std::max(radius_px, (*pixel - center).norm());
   }
@@ -103,7 +103,7 @@ Extent compute_extent(const Scene& scene, const FrameRenderer& renderer, const L
   for (const Eigen::Vector3d& point_m : bright_points(lamp.glow, eye_m)) {
     const auto pixel = lens.project_point(camera_from_world * point_m);
     if (!pixel) continue;
-    const double line = renderer.pixel_rays().convert_pixel_to_readout_order(*pixel)[0];
+    const double line = renderer.pixel_rays().to_readout_order(*pixel)[0];
     first_line = std::min(first_line, line);
     last_line = std::max(last_line, line);
   }
@@ -122,7 +122,7 @@ class Score {
   void add(const Scene& scene, const FrameRenderer& renderer, const LampShot& shot,
            const std::vector<Light>& lights) {
     ++images_;
-    const auto truth = find_true_lamps_in_image(scene, renderer, shot);
+    const auto truth = list_true_lamps(scene, renderer, shot);
     std::vector<Extent> extents;
     for (const TrueLamp& lamp : truth) {
       const auto in_scene = std::ranges::find(scene.lamps, lamp.id, &SceneLamp::id);
@@ -199,7 +199,7 @@ class Score {
     const double near_px = 0.08 * scene.camera.imager_px[0];
     std::string name = "elsewhere";
     double min_px = near_px;
-    for (const TrueOtherLight& other : find_true_other_lights_in_image(scene, renderer, shot)) {
+    for (const TrueOtherLight& other : list_true_lights(scene, renderer, shot)) {
       const double distance_px = (other.pixel - pixel).norm();
       if (distance_px > min_px) continue;
       min_px = distance_px;
@@ -237,14 +237,13 @@ void try_shot(const Scene& scene, const FrameRenderer& renderer, const LightDete
     return score.add(scene, renderer, shot, detect_lights(detector, image));
   }
   const Eigen::Matrix3d level_from_camera =
-      level_rotation_from_inclination(shot.motion.base_inclination_at(0)) *
+      level_rotation_from_inclination(shot.motion.inclination_at(0)) *
       scene.mount.level_from_camera;
-  score.add(scene, renderer, shot,
-            detect_lights(detector.copy_detector_for_camera_tilt(level_from_camera), image));
+  score.add(scene, renderer, shot, detect_lights(detector.copy_for_tilt(level_from_camera), image));
 }
 
 LightDetector make_detector_for_image(const Scene& scene) {
-  return {make_scene_lamp_map(scene, false), make_detector_camera(make_true_calibration(scene))};
+  return {make_lamp_map(scene, false), make_detector_camera(make_true_calibration(scene))};
 }
 
 /// Images of a scene's folders of lamps. The seed of each round also changes the chips.
@@ -259,15 +258,13 @@ void try_scene(Scene scene, std::uint64_t seed, int images, bool new_seed_in_eac
   for (int i = 0; i < images; ++i) {
     const auto index = static_cast<std::size_t>(i) / sets.size();
     const CaptureSet& set = sets[static_cast<std::size_t>(i) % sets.size()];
-    const auto round =
-        new_seed_in_each ? static_cast<std::size_t>(i) : index / count_captures_of_set(set);
+    const auto round = new_seed_in_each ? static_cast<std::size_t>(i) : index / count_shots(set);
     scene.seed = seed + round;
-    draw_random_scene_parts(scene);
+    draw_random_parts(scene);
     // Spread over the whole folder, even for few images.
     const auto wanted = static_cast<std::size_t>(images) / sets.size() + 1;
-    const std::size_t step = std::max<std::size_t>(1, count_captures_of_set(set) / wanted);
-    try_shot(scene, renderer, detector,
-             make_lamp_capture_parameters(scene, set, index * step % count_captures_of_set(set)),
+    const std::size_t step = std::max<std::size_t>(1, count_shots(set) / wanted);
+    try_shot(scene, renderer, detector, make_lamp_shot(scene, set, index * step % count_shots(set)),
              score);
   }
 }
@@ -313,20 +310,19 @@ class ForeignScene {
 
   /// Sets a different duty cycle for each lamp, also in the lamp map.
   void draw_duties(int index) {
-    cv::RNG random = make_seeded_random_generator(seed_, "duties", static_cast<std::size_t>(index));
+    cv::RNG random = make_generator(seed_, "duties", static_cast<std::size_t>(index));
     for (SceneLamp& lamp : scene_.lamps) lamp.duty = random.uniform(0.3, 0.7);
   }
 
   LampShot draw_shot(int index) {
-    random_ =
-        make_seeded_random_generator(seed_, "foreign lights", static_cast<std::size_t>(index));
+    random_ = make_generator(seed_, "foreign lights", static_cast<std::size_t>(index));
     set_.lamps->pivots_m = {{random_.uniform(-0.7, 0.7), random_.uniform(-0.3, 0.3)}};
     set_.lamps->heights_m = {random_.uniform(0.0, 0.7)};
     set_.lamps->yaws_rad = {random_.uniform(0.0, 2 * std::numbers::pi)};
-    scene_.seed = draw_seed_from_generator(random_);
+    scene_.seed = draw_seed(random_);
     draw_clutter();
-    draw_random_scene_parts(scene_);
-    return make_lamp_capture_parameters(scene_, set_, 0);
+    draw_random_parts(scene_);
+    return make_lamp_shot(scene_, set_, 0);
   }
 
   const Scene& scene() const { return scene_; }

@@ -25,7 +25,7 @@ namespace {
 
 constexpr std::size_t kPoints = 1000;
 
-constexpr LensModel kSplined = lens_model_for_spline_grid({3, 16, 14, 150});
+constexpr LensModel kSplined = splined_lens_model({3, 16, 14, 150});
 
 /// Equidistant.
 std::vector<double> splined_parameters(const SplineGrid& grid) {
@@ -44,7 +44,7 @@ std::vector<double> splined_parameters(const SplineGrid& grid) {
 }
 
 std::vector<double> lens_parameters(LensModel model) {
-  if (is_splined_lens_model(model)) return splined_parameters(spline_grid_of_lens_model(model));
+  if (is_splined_lens_model(model)) return splined_parameters(spline_grid_of(model));
   if (model == LensModel::fisheye) return {400, 401, 399.5, 299.5, 0.03, -0.012, 0.004, -0.0006};
   std::vector<double> parameters{520,   521,  399.5, 299.5, -0.28, 0.09,  1e-4,  -2e-4,
                                  -0.01, 0.02, 0.01,  0.001, 1e-3,  -5e-4, -1e-3, 5e-4};

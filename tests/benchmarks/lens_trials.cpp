@@ -59,19 +59,19 @@ void try_set(int set, Counts& counts) {
     ++counts.unsolved;
     return;
   }
-  const CalibrationReport report = compute_lens_calibration_report(solution, input);
+  const CalibrationReport report = make_lens_report(solution, input);
   LensEstimate lens;
   lens.solution = solution;
   lens.report = report;
-  lens.coverage = compute_board_view_coverage(solution, input);
+  lens.coverage = measure_view_coverage(solution, input);
   const auto metrics = collect_lens_metrics(lens);
-  if (!describe_failed_gates(check_gates(make_default_lens_gates(), metrics)).empty()) {
+  if (!describe_failed_gates(check_gates(make_lens_gates(), metrics)).empty()) {
     ++counts.refused;
     return;
   }
   ++counts.num_accepted;
-  const auto difference = compute_projection_difference(
-      views.lens, solution.fitted_lens(), views.imager_px, [](const auto&) { return 1; });
+  const auto difference = compare_projections(views.lens, solution.fitted_lens(), views.imager_px,
+                                              [](const auto&) { return 1; });
   const double ratio = difference ? difference->rms_px / report.expected_rms_px : INFINITY;
   counts.max_ratio = std::max(counts.max_ratio, ratio);
   if (!difference || (ratio > apart && difference->rms_px > small_px)) {

@@ -47,7 +47,7 @@ bool try_subsets(const std::vector<BoardView>& views, const Board& board, int se
     fmt::print("all views: no lens: {}\n", all.problem);
     return false;
   }
-  fmt::print("all {} views: {}\n", views.size(), describe_lens_model_choice(*all.choice));
+  fmt::print("all {} views: {}\n", views.size(), describe_choice(*all.choice));
   std::map<std::string, int> selected;
   std::vector<double> errors_px, ratios;
   int inconsistent = 0;
@@ -63,11 +63,11 @@ bool try_subsets(const std::vector<BoardView>& views, const Board& board, int se
     }
     ++selected[std::string(lens_model_name(result.choice->model))];
     if (!is_selected_below_rejected(*result.choice)) ++inconsistent;
-    const auto difference = compute_projection_difference(
-        all.solution.fitted_lens(), result.solution.fitted_lens(), all.solution.problem.imager_px,
-        [&](const Eigen::Vector2d& pixel) {
-          return polygon_contains(result.report.region, pixel) ? 1.0 : INFINITY;
-        });
+    const auto difference =
+        compare_projections(all.solution.fitted_lens(), result.solution.fitted_lens(),
+                            all.solution.problem.imager_px, [&](const Eigen::Vector2d& pixel) {
+                              return polygon_contains(result.report.region, pixel) ? 1.0 : INFINITY;
+                            });
     if (!difference) continue;
     errors_px.push_back(difference->worst_px);
     ratios.push_back(difference->worst_px / result.report.uncertainty_worst_px);
@@ -94,7 +94,7 @@ int main(int argc, char** argv) {
       vlp::read_board_views(argv[1], board, argv[2], {std::atoi(argv[3]), std::atoi(argv[4])}, {});
   const int sets = argc > 5 ? std::atoi(argv[5]) : default_sets;
   const int views = argc > 6 ? std::atoi(argv[6]) : default_views;
-  return vlp::try_subsets(vlp::collect_board_views_of_kept_images(observations.images), board, sets,
+  return vlp::try_subsets(vlp::collect_board_views(observations.images), board, sets,
                           static_cast<std::size_t>(views))
              ? 0
              : 1;

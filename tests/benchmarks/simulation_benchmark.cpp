@@ -28,20 +28,18 @@ const Rig& rig() {
 }
 
 void lamp_light(benchmark::State& state) {
-  const LampShot shot = make_lamp_capture_parameters(rig().scene, rig().set("check"), 100);
-  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_lamps_in_electrons(shot));
+  const LampShot shot = make_lamp_shot(rig().scene, rig().set("check"), 100);
+  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_lamps(shot));
 }
 
 void board_light(benchmark::State& state) {
-  const BoardShot shot = make_board_capture_parameters(rig().scene, rig().set("boards"), 3);
-  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_board_in_electrons(shot));
+  const BoardShot shot = make_board_shot(rig().scene, rig().set("boards"), 3);
+  for (auto _ : state) benchmark::DoNotOptimize(rig().renderer.render_board(shot));
 }
 
 cv::Mat1f electrons(bool board) {
-  return board ? rig().renderer.render_board_in_electrons(
-                     make_board_capture_parameters(rig().scene, rig().set("boards"), 3))
-               : rig().renderer.render_lamps_in_electrons(
-                     make_lamp_capture_parameters(rig().scene, rig().set("check"), 100));
+  return board ? rig().renderer.render_board(make_board_shot(rig().scene, rig().set("boards"), 3))
+               : rig().renderer.render_lamps(make_lamp_shot(rig().scene, rig().set("check"), 100));
 }
 
 void sensor(benchmark::State& state, bool board) {

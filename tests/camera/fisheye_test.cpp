@@ -58,7 +58,7 @@ TEST(FisheyeLens, JacobiansMatchDifferenceQuotientsBeyond90Degrees) {
   constexpr double step = 1e-5;
   for (const double degrees : {0.01, 30.0, 89.9, 94.0}) {
     const Eigen::Vector3d point = 3 * ray_at(degrees * kDegree, 2.2);
-    const auto at = lens.project_point_with_jacobians(point);
+    const auto at = lens.project_with_jacobians(point);
     ASSERT_TRUE(at);
     for (int i = 0; i < 3; ++i) {
       const Eigen::Vector3d off = step * Eigen::Vector3d::Unit(i);
@@ -89,8 +89,7 @@ TEST(FisheyeLens, ProjectInvertsUnprojectUpToValidAngle) {
                                          {1e4, 0, 0, 0}}) {
     const Lens lens(LensModel::fisheye, std::array{300.0, 301.0, 0.0, 0.0, k[0], k[1], k[2], k[3]});
     const Fisheye fisheye{k};
-    const double edge =
-        fisheye.fisheye_radius_from_angle(fisheye.compute_max_valid_fisheye_angle_rad());
+    const double edge = fisheye.radius_from_angle(fisheye.compute_max_angle_rad());
     for (int i = 0; i <= 1000; ++i) {
       const double fraction = i < 900 ? i / 900.0 : 1 - std::pow(10.0, -2 - (i - 900) / 7.0);
       const Eigen::Vector2d pixel(300 * edge * fraction * 0.6, 301 * edge * fraction * 0.8);
@@ -106,14 +105,14 @@ TEST(FisheyeLens, ProjectInvertsUnprojectUpToValidAngle) {
 TEST(FisheyeLens, ReturnsNulloptForRaysAndPixelsBeyondFold) {
   const Fisheye fisheye{{-0.1, 0, 0, 0}};  // d' = 1 - 0.3 a^2
   const double fold_rad = std::sqrt(1 / 0.3);
-  EXPECT_NEAR(fisheye.compute_max_valid_fisheye_angle_rad(), fold_rad, 1e-12);
+  EXPECT_NEAR(fisheye.compute_max_angle_rad(), fold_rad, 1e-12);
   const Lens lens(LensModel::fisheye, std::array{300.0, 300.0, 400.0, 300.0, -0.1, 0.0, 0.0, 0.0});
   EXPECT_TRUE(lens.project_point(ray_at(fold_rad - 1e-6, 1)));
   EXPECT_FALSE(lens.project_point(ray_at(fold_rad + 1e-6, 1)));
-  const double edge_px = 300 * fisheye.fisheye_radius_from_angle(fold_rad);
+  const double edge_px = 300 * fisheye.radius_from_angle(fold_rad);
   EXPECT_TRUE(lens.unproject_pixel({400 + edge_px - 1e-3, 300}));
   EXPECT_FALSE(lens.unproject_pixel({400 + edge_px + 1e-3, 300}));
-  EXPECT_EQ(Fisheye{}.compute_max_valid_fisheye_angle_rad(), std::numbers::pi);
+  EXPECT_EQ(Fisheye{}.compute_max_angle_rad(), std::numbers::pi);
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ class FoldingLens : public testing::TestWithParam<FoldedLens> {
     return result;
   }
   const Lens lens_{model(), parameters_with(model(), GetParam().distortion)};
-  const double valid_radius_ = distortion().compute_max_valid_distortion_radius();
+  const double valid_radius_ = distortion().compute_max_radius();
 };
 
 TEST_P(FoldingLens, UnprojectReturnsValidRayOrNulloptInAndAroundImage) {
@@ -99,7 +99,7 @@ TEST_P(FoldingLens, ProjectReturnsNulloptBeyondFold) {
     const auto at = [&](double radius) -> Vector3d { return (radius * direction).homogeneous(); };
     EXPECT_TRUE(lens_.project_point(at(valid_radius_ * (1 - 1e-9))));
     EXPECT_FALSE(lens_.project_point(at(valid_radius_ * (1 + 1e-9))));
-    EXPECT_FALSE(lens_.project_point_with_jacobians(at(valid_radius_ * 3)));
+    EXPECT_FALSE(lens_.project_with_jacobians(at(valid_radius_ * 3)));
   }
 }
 

@@ -31,7 +31,7 @@ constexpr double kStep = 1e-5, kTolerance = 1e-7;
 
 TEST_P(LensJacobian, PixelJacobianWrtPointMatchesDifferenceQuotient) {
   for_random_points(GetParam(), [](const auto&, const Lens& lens, const Eigen::Vector3d& point) {
-    const auto projection = lens.project_point_with_jacobians(point).value();
+    const auto projection = lens.project_with_jacobians(point).value();
     Eigen::Matrix<double, 2, 3> expected;
     for (int i = 0; i < 3; ++i) {
       const Eigen::Vector3d step = kStep * Eigen::Vector3d::Unit(i);
@@ -89,7 +89,7 @@ TEST_P(LensJacobian, RayJacobianWrtPixelMatchesDifferenceQuotient) {
 TEST_P(LensJacobian, RayJacobianInvertsPixelJacobian) {
   for_random_points(GetParam(), [](const auto&, const Lens& lens, const Eigen::Vector3d& point) {
     const auto ray = lens.unproject_pixel(lens.project_point(point).value()).value();
-    const auto projection = lens.project_point_with_jacobians(ray.direction).value();
+    const auto projection = lens.project_with_jacobians(ray.direction).value();
     ASSERT_THAT(projection.d_pixel_d_point * ray.d_direction_d_pixel,
                 IsNear(Eigen::Matrix2d::Identity(), 1e-6));
   });

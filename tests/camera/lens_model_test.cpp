@@ -56,16 +56,16 @@ TEST(ListLensModelNames, ReturnsNamesOfAllModelsInOneString) {
             "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=16_Ny=14_fov_x_deg=190 and its like");
 }
 
-TEST(LensModelForSplineGrid, ReturnsModelWithGridNameAndParameterCount) {
+TEST(SplinedLensModel, ReturnsModelWithGridNameAndParameterCount) {
   for (const SplineGrid& grid : {SplineGrid{2, 3, 3, 1}, SplineGrid{3, 4, 4, 359},
                                  SplineGrid{2, 255, 255, 359}, SplineGrid{3, 30, 20, 170}}) {
-    const LensModel model = lens_model_for_spline_grid(grid);
+    const LensModel model = splined_lens_model(grid);
     EXPECT_TRUE(is_splined_lens_model(model));
-    EXPECT_EQ(spline_grid_of_lens_model(model), grid);
+    EXPECT_EQ(spline_grid_of(model), grid);
     EXPECT_EQ(lens_model_from_name(lens_model_name(model)), model);
     EXPECT_EQ(num_lens_parameters(model), 4U + 2U * static_cast<unsigned>(grid.nx * grid.ny));
   }
-  EXPECT_EQ(lens_model_name(lens_model_for_spline_grid({3, 30, 20, 170})),
+  EXPECT_EQ(lens_model_name(splined_lens_model({3, 30, 20, 170})),
             "LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=30_Ny=20_fov_x_deg=170");
 }
 

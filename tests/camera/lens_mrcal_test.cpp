@@ -43,7 +43,7 @@ TEST_P(LensAgainstMrcal, PixelJacobiansMatchGradientsOfMrcal) {
     const Lens lens(GetParam(), parameters);
     const MrcalOracle oracle = make_oracle(GetParam(), parameters);
     for (const auto& point : random_points()) {
-      const auto projection = lens.project_point_with_jacobians(point);
+      const auto projection = lens.project_with_jacobians(point);
       ASSERT_TRUE(projection);
       EXPECT_EQ(projection->pixel, lens.project_point(point));
       const auto expected = oracle.gradients(point);

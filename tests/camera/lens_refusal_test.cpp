@@ -30,7 +30,7 @@ TEST_P(LensWithInvalidInput, ProjectReturnsNulloptForNonFinitePoints) {
       point(i) = bad;
       if (i == 2 && bad == kInfinity) continue;  // straight ahead for a division by z
       EXPECT_FALSE(lens.project_point(point)) << point.transpose();
-      EXPECT_FALSE(lens.project_point_with_jacobians(point)) << point.transpose();
+      EXPECT_FALSE(lens.project_with_jacobians(point)) << point.transpose();
     }
   }
 }
@@ -92,7 +92,7 @@ TEST(Lens, ProjectsPointsBehindCameraForWideModelsOnly) {
     const bool all_round = model == LensModel::stereographic || model == LensModel::fisheye;
     for (const Vector3d& point : {Vector3d(0.1, 0.2, -1), Vector3d(1, 0, 0), Vector3d(1, 2, -1)}) {
       EXPECT_EQ(lens.project_point(point).has_value(), all_round) << lens_model_name(model);
-      EXPECT_EQ(lens.project_point_with_jacobians(point).has_value(), all_round)
+      EXPECT_EQ(lens.project_with_jacobians(point).has_value(), all_round)
           << lens_model_name(model);
     }
     EXPECT_FALSE(lens.project_point({0, 0, -1})) << lens_model_name(model);

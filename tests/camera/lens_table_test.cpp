@@ -17,8 +17,7 @@ using testing::ElementsAre;
 
 std::vector<std::string_view> names_of(LensModel model) {
   std::vector<std::string_view> names;
-  for (const LensDistortion& distortion : list_distortion_names_and_initial_values(model))
-    names.push_back(distortion.name);
+  for (const LensDistortion& distortion : list_distortions(model)) names.push_back(distortion.name);
   return names;
 }
 
@@ -29,7 +28,7 @@ TEST(ListLensModels, ReturnsModelsInOrderOfEnumeration) {
   }
 }
 
-TEST(ListDistortionNamesAndInitialValues, ReturnsNamesInParameterOrder) {
+TEST(ListDistortions, ReturnsNamesInParameterOrder) {
   EXPECT_THAT(names_of(LensModel::stereographic), ElementsAre());
   EXPECT_THAT(names_of(LensModel::opencv5), ElementsAre("k1", "k2", "p1", "p2", "k3"));
   EXPECT_THAT(names_of(LensModel::fisheye), ElementsAre("k1", "k2", "k3", "k4"));
@@ -39,11 +38,10 @@ TEST(ListDistortionNamesAndInitialValues, ReturnsNamesInParameterOrder) {
               ElementsAre());
 }
 
-TEST(ListDistortionNamesAndInitialValues, FisheyeInitialValuesProjectNearlyStereographically) {
+TEST(ListDistortions, FisheyeInitialValuesProjectNearlyStereographically) {
   std::vector<double> parameters{400, 400, 320, 240};
   const Lens stereographic(LensModel::stereographic, parameters);
-  for (const LensDistortion& distortion :
-       list_distortion_names_and_initial_values(LensModel::fisheye)) {
+  for (const LensDistortion& distortion : list_distortions(LensModel::fisheye)) {
     parameters.push_back(distortion.start);
   }
   const Lens fisheye(LensModel::fisheye, parameters);

@@ -48,7 +48,7 @@ std::vector<double> random_parameters(LensModel model, Random& random) {
     }
     if (is_splined_lens_model(model)) {
       constexpr double error = 0.01;  // at most a twentieth of the way to the next control point
-      const auto splined = splined_parameters(spline_grid_of_lens_model(model), error, random);
+      const auto splined = splined_parameters(spline_grid_of(model), error, random);
       parameters.insert(parameters.end(), splined.begin() + 4, splined.end());
       return parameters;
     }
@@ -57,7 +57,7 @@ std::vector<double> random_parameters(LensModel model, Random& random) {
         parameters.push_back(random.uniform(-bound, bound));
       }
       const Fisheye fisheye{{parameters[4], parameters[5], parameters[6], parameters[7]}};
-      if (fisheye.compute_max_valid_fisheye_angle_rad() > 1.7) return parameters;
+      if (fisheye.compute_max_angle_rad() > 1.7) return parameters;
       continue;
     }
     Distortion distortion;
@@ -65,7 +65,7 @@ std::vector<double> random_parameters(LensModel model, Random& random) {
       distortion.k[i] = random.uniform(kBounds[i][0], kBounds[i][1]);
       parameters.push_back(distortion.k[i]);
     }
-    if (distortion.compute_max_valid_distortion_radius() > 1.1 * kTan60) return parameters;
+    if (distortion.compute_max_radius() > 1.1 * kTan60) return parameters;
   }
 }
 
@@ -85,8 +85,7 @@ std::vector<double> parameters_with(LensModel model, const std::vector<double>& 
 }
 
 Eigen::Matrix2Xd parameter_jacobian(const Lens& lens, const Eigen::Vector3d& x_in_camera) {
-  const auto [parameters, d_pixel] =
-      lens.compute_pixel_jacobian_wrt_intrinsics(x_in_camera).value();
+  const auto [parameters, d_pixel] = lens.differentiate_intrinsics(x_in_camera).value();
   const auto count = static_cast<Eigen::Index>(num_lens_parameters(lens.lens_model()));
   Eigen::Matrix2Xd jacobian = Eigen::Matrix2Xd::Zero(2, count);
   for (std::size_t i = 0; i < parameters.size(); ++i) {

@@ -24,8 +24,8 @@ inline void PrintTo(LensModel model, std::ostream* out) {
   }
 }
 
-inline constexpr LensModel kCubic = lens_model_for_spline_grid({3, 16, 14, 190}),
-                           kQuadratic = lens_model_for_spline_grid({2, 12, 11, 160});
+inline constexpr LensModel kCubic = splined_lens_model({3, 16, 14, 190}),
+                           kQuadratic = splined_lens_model({2, 12, 11, 160});
 inline constexpr LensModel kMrcalModels[] = {LensModel::pinhole,
                                              LensModel::stereographic,
                                              LensModel::opencv4,
@@ -45,7 +45,7 @@ inline constexpr LensModel kOpencvModels[] = {LensModel::opencv4, LensModel::ope
 std::vector<double> splined_parameters(const SplineGrid& grid, double error, Random& random);
 
 /// A random plausible lens that is one to one up to 60 degrees off axis and a little more; the
-/// rest is for its tangential and prism terms, which compute_max_valid_distortion_radius() leaves
+/// rest is for its tangential and prism terms, which compute_max_radius() leaves
 /// out.
 std::vector<double> random_parameters(LensModel model, Random& random);
 

@@ -20,7 +20,7 @@ Vector3d ray_of(const Vector2d& u) { return {u.x(), u.y(), 1 - u.squaredNorm() /
 class SplinedLens : public testing::TestWithParam<LensModel> {
  protected:
   Random random_{61};
-  const SplineGrid grid_ = spline_grid_of_lens_model(GetParam());
+  const SplineGrid grid_ = spline_grid_of(GetParam());
   const std::vector<double> parameters_ = splined_parameters(grid_, 0.01, random_);
   const Lens lens_{GetParam(), parameters_};
   const Vector2d reach_ =
@@ -72,8 +72,8 @@ TEST_P(SplinedLens, ProjectReturnsNulloptOnlyBeyondEdgeOfSplineGrid) {
         ASSERT_TRUE(pixel) << edge.transpose();
         EXPECT_TRUE(lens_.unproject_pixel(*pixel)) << edge.transpose();
         EXPECT_FALSE(lens_.project_point(ray_of((1 + 1e-9) * edge)));
-        EXPECT_FALSE(lens_.project_point_with_jacobians(ray_of((1 + 1e-9) * edge)));
-        EXPECT_FALSE(lens_.compute_pixel_jacobian_wrt_intrinsics(ray_of((1 + 1e-9) * edge)));
+        EXPECT_FALSE(lens_.project_with_jacobians(ray_of((1 + 1e-9) * edge)));
+        EXPECT_FALSE(lens_.differentiate_intrinsics(ray_of((1 + 1e-9) * edge)));
       }
     }
   }
@@ -114,14 +114,14 @@ TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
   Random random(62);
   int rays = 0;
   for (int trial = 0; trial < 20; ++trial) {
-    const LensModel model = lens_model_for_spline_grid({3, 12, 10, 120});
-    const Lens lens(model, splined_parameters(spline_grid_of_lens_model(model), 0.4, random));
+    const LensModel model = splined_lens_model({3, 12, 10, 120});
+    const Lens lens(model, splined_parameters(spline_grid_of(model), 0.4, random));
     for (double v = -300; v <= 900; v += 37) {
       for (double x = -300; x <= 1100; x += 37) {
         const auto ray = lens.unproject_pixel({x, v});
         if (!ray) continue;
         ++rays;
-        const auto back = lens.project_point_with_jacobians(ray->direction);
+        const auto back = lens.project_with_jacobians(ray->direction);
         ASSERT_TRUE(back);
         ASSERT_THAT(back->pixel, IsNear(Vector2d(x, v), 1e-7));
         ASSERT_GT(ray->d_direction_d_pixel.topRows<2>().determinant(), 0);
@@ -132,7 +132,7 @@ TEST(SplinedLensWithRandomControlPoints, UnprojectReturnsRaysOnlyWithoutFold) {
 }
 
 TEST(SplinedLensWithExtremeControlPoints, ProjectAndUnprojectReturnOnlyFiniteResults) {
-  const LensModel model = lens_model_for_spline_grid({3, 5, 4, 90});
+  const LensModel model = splined_lens_model({3, 5, 4, 90});
   std::vector<std::vector<double>> lenses;
   for (const double all : {0.0, -1.0, 1e150, -1e300}) {
     lenses.emplace_back(num_lens_parameters(model), all);

@@ -24,17 +24,17 @@ class CsvTableTest : public testing::Test {
 TEST_F(CsvTableTest, FindsColumnsByNameInAnyOrder) {
   const CsvTable table = read("b,extra,a\n1,x,2\n3,,4\n");
   ASSERT_EQ(table.num_rows(), 2);
-  EXPECT_EQ(table.get_cell_number(0, table.get_required_column("a")), 2);
-  EXPECT_EQ(table.get_cell_number(1, table.get_required_column("b")), 3);
-  EXPECT_EQ(table.get_cell_text(1, table.get_required_column("extra")), "");
-  EXPECT_FALSE(table.get_optional_column("c"));
+  EXPECT_EQ(table.get_cell_number(0, table.require_column("a")), 2);
+  EXPECT_EQ(table.get_cell_number(1, table.require_column("b")), 3);
+  EXPECT_EQ(table.get_cell_text(1, table.require_column("extra")), "");
+  EXPECT_FALSE(table.find_column("c"));
 }
 
 TEST_F(CsvTableTest, ReadsQuotedFields) {
   const CsvTable table =
       read("image,a\n\"one, two.png\",1\n\"say \"\"hi\"\"\",2\n\"two\nlines\",3\n\"\",4\n");
   ASSERT_EQ(table.num_rows(), 4);
-  const auto image = table.get_required_column("image");
+  const auto image = table.require_column("image");
   EXPECT_EQ(table.get_cell_text(0, image), "one, two.png");
   EXPECT_EQ(table.get_cell_text(1, image), "say \"hi\"");
   EXPECT_EQ(table.get_cell_text(2, image), "two\nlines");
@@ -44,15 +44,15 @@ TEST_F(CsvTableTest, ReadsQuotedFields) {
 TEST_F(CsvTableTest, IgnoresCarriageReturnsByteOrderMarkAndEmptyLines) {
   const CsvTable table = read("\xEF\xBB\xBFimage,a\r\n\r\nx.png,1\r\ny.png,2\r\n\r\n");
   ASSERT_EQ(table.num_rows(), 2);
-  EXPECT_EQ(table.get_cell_text(1, table.get_required_column("image")), "y.png");
-  EXPECT_EQ(table.get_cell_integer(1, table.get_required_column("a")), 2);
+  EXPECT_EQ(table.get_cell_text(1, table.require_column("image")), "y.png");
+  EXPECT_EQ(table.get_cell_integer(1, table.require_column("a")), 2);
 }
 
 TEST_F(CsvTableTest, HasNoRowsForHeaderAlone) { EXPECT_EQ(read("a,b\n").num_rows(), 0); }
 
 TEST_F(CsvTableTest, GetRequiredColumnThrowsForMissingColumn) {
   const CsvTable table = read("image,lamp\nx,1\n");
-  EXPECT_THAT(rejection_message([&] { (void)table.get_required_column("u_px"); }),
+  EXPECT_THAT(rejection_message([&] { (void)table.require_column("u_px"); }),
               HasSubstr("a.csv:1: u_px: this column is missing; the columns are: image, lamp"));
 }
 
@@ -77,21 +77,21 @@ TEST_F(CsvTableTest, RejectsInvalidQuotesDuplicateColumnsAndEmptyFile) {
 TEST_F(CsvTableTest, GetNumberReportsLineAndColumnOfInvalidNumber) {
   for (const std::string bad : {"", "x", "1.5 m", "nan", "inf", "-inf", "1e999", "0x10", "1,5"}) {
     const CsvTable table = read("image,u_px\nok,1\nbad,\"" + bad + "\"\n");
-    EXPECT_THAT(rejection_message(
-                    [&] { (void)table.get_cell_number(1, table.get_required_column("u_px")); }),
-                HasSubstr("a.csv:3: u_px: should be a finite number, not '" + bad + "'"));
+    EXPECT_THAT(
+        rejection_message([&] { (void)table.get_cell_number(1, table.require_column("u_px")); }),
+        HasSubstr("a.csv:3: u_px: should be a finite number, not '" + bad + "'"));
   }
   const CsvTable table = read("lamp\n1.5\n");
-  EXPECT_THAT(rejection_message(
-                  [&] { (void)table.get_cell_integer(0, table.get_required_column("lamp")); }),
-              HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
+  EXPECT_THAT(
+      rejection_message([&] { (void)table.get_cell_integer(0, table.require_column("lamp")); }),
+      HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
 }
 
 TEST_F(CsvTableTest, MessagesRepeatAtMost300BytesOfFile) {
   const std::string text(100'000, 'x');
   const CsvTable table = read("image,u_px\n" + text + "," + text + "\n" + text + ",1\n");
   EXPECT_LT(rejection_message([&] {
-              (void)table.get_cell_number(0, table.get_required_column("u_px"));
+              (void)table.get_cell_number(0, table.require_column("u_px"));
             }).size(),
             600U);
   EXPECT_LT(std::string(InputError("a.csv", text).what()).size(), 320U);
@@ -105,7 +105,7 @@ TEST_F(CsvTableTest, ReturnsFieldsWrittenByCsvWriter) {
   const CsvTable table(folder / "b.csv");
   ASSERT_EQ(table.num_rows(), fields.size());
   for (std::size_t row = 0; row < fields.size(); ++row) {
-    EXPECT_EQ(table.get_cell_text(row, table.get_required_column("one")), fields[row]);
+    EXPECT_EQ(table.get_cell_text(row, table.require_column("one")), fields[row]);
   }
 }
 
@@ -119,9 +119,9 @@ TEST_F(CsvTableTest, ReturnsFormulasThatCsvWriterEscapes) {
   EXPECT_THAT(content, HasSubstr("\n\"'=1+1\",x\n"));
   const CsvTable table(folder / "b.csv");
   ASSERT_EQ(table.num_rows(), formulas.size());
-  EXPECT_TRUE(table.get_optional_column("=two"));
+  EXPECT_TRUE(table.find_column("=two"));
   for (std::size_t row = 0; row < formulas.size(); ++row) {
-    EXPECT_EQ(table.get_cell_text(row, table.get_required_column("one")), formulas[row]);
+    EXPECT_EQ(table.get_cell_text(row, table.require_column("one")), formulas[row]);
   }
 }
 
@@ -136,9 +136,9 @@ TEST_F(CsvTableTest, ReadsNumbersThatCsvWriterWritesWithoutEscape) {
   const CsvTable table(folder / "b.csv");
   ASSERT_EQ(table.num_rows(), 1U);
   for (std::size_t i = 0; i < columns.size(); ++i) {
-    EXPECT_EQ(table.get_cell_text(0, table.get_required_column(columns[i])), fields[i]);
+    EXPECT_EQ(table.get_cell_text(0, table.require_column(columns[i])), fields[i]);
   }
-  EXPECT_EQ(table.get_cell_number(0, table.get_required_column("a")), -0.5);
+  EXPECT_EQ(table.get_cell_number(0, table.require_column("a")), -0.5);
 }
 
 TEST_F(CsvTableTest, RejectsDuplicateColumnAmong200000Columns) {
@@ -151,7 +151,7 @@ TEST_F(CsvTableTest, RejectsDuplicateColumnAmong200000Columns) {
   EXPECT_THAT(refusal(header + ",twice\n" + row + ",0\n"),
               HasSubstr("a.csv:1: twice: this column occurs twice"));
   const CsvTable table = read(header + "\n" + row + "\n");
-  EXPECT_LT(rejection_message([&] { (void)table.get_required_column("u_px"); }).size(), 1000);
+  EXPECT_LT(rejection_message([&] { (void)table.require_column("u_px"); }).size(), 1000);
 }
 
 }  // namespace

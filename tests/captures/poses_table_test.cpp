@@ -20,9 +20,9 @@ TEST(WritePoses, WritesUpperTriangleAndQuaternionWithPositiveRealPart) {
   const CsvTable csv(folder / "poses.csv");
   ASSERT_EQ(csv.num_rows(), 2U);
   const auto number = [&](const char* column) {
-    return csv.get_cell_number(0, csv.get_required_column(column));
+    return csv.get_cell_number(0, csv.require_column(column));
   };
-  EXPECT_EQ(csv.get_cell_text(0, csv.get_required_column("image")), "a.png");
+  EXPECT_EQ(csv.get_cell_text(0, csv.require_column("image")), "a.png");
   EXPECT_EQ(number("y_m"), -2);
   EXPECT_EQ(number("qw"), 0.5);
   EXPECT_EQ(number("qx"), -0.5);
@@ -32,7 +32,7 @@ TEST(WritePoses, WritesUpperTriangleAndQuaternionWithPositiveRealPart) {
   EXPECT_EQ(number("cov_y_rz_m_rad"), 7);
   EXPECT_EQ(number("cov_rx_ry_rad2"), 8);
   EXPECT_EQ(number("cov_rz_rz_rad2"), 11);
-  EXPECT_EQ(csv.get_cell_text(1, csv.get_required_column("cov_x_x_m2")), "");
+  EXPECT_EQ(csv.get_cell_text(1, csv.require_column("cov_x_x_m2")), "");
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ TEST(ReadPathTable, RejectsPathWithoutLength) {
       HasSubstr("p.csv:2: y_m"));
 }
 
-TEST(FindNearestPointOnPath, DistanceMatchesBruteForceSearch) {
+TEST(ProjectOntoPath, DistanceMatchesBruteForceSearch) {
   Random random(1);
   Path path;
   for (int i = 0; i < 30; ++i) {
@@ -81,8 +81,7 @@ TEST(FindNearestPointOnPath, DistanceMatchesBruteForceSearch) {
         min_squared_distance = std::min(min_squared_distance, (point - place).norm());
       }
     }
-    EXPECT_NEAR((find_nearest_point_on_path(path, place).xy_m - place).norm(), min_squared_distance,
-                2e-3);
+    EXPECT_NEAR((project_onto_path(path, place).xy_m - place).norm(), min_squared_distance, 2e-3);
   }
 }
 
@@ -98,11 +97,11 @@ TEST(ReadPathTable, RejectsWaypointBeyond1000Kilometers) {
   EXPECT_THAT(refusal("0,0,1e7\n"), HasSubstr("p.csv:3: z_m"));
 }
 
-TEST(FindNearestPointOnPath, InterpolatesHeightBetweenWaypoints) {
+TEST(ProjectOntoPath, InterpolatesHeightBetweenWaypoints) {
   const Path path{{{0, 0}, {2, 0}, {2, 2}}, {0, 1, 5}};
-  EXPECT_DOUBLE_EQ(find_nearest_point_on_path(path, {1, 1e-3}).z_m.value(), 0.5);
-  EXPECT_DOUBLE_EQ(find_nearest_point_on_path(path, {3, 1.5}).z_m.value(), 4);
-  EXPECT_DOUBLE_EQ(find_nearest_point_on_path(path, {9, 9}).z_m.value(), 5);
+  EXPECT_DOUBLE_EQ(project_onto_path(path, {1, 1e-3}).z_m.value(), 0.5);
+  EXPECT_DOUBLE_EQ(project_onto_path(path, {3, 1.5}).z_m.value(), 4);
+  EXPECT_DOUBLE_EQ(project_onto_path(path, {9, 9}).z_m.value(), 5);
 }
 
 }  // namespace

@@ -26,7 +26,7 @@ Camera pinhole_camera() {
 
 const ErrorSources kNoise{0.1, 0, 0, 0};
 
-TEST(FindVisibleLamps, ExcludesLampsOutsideImageOrBelowCamera) {
+TEST(ListVisiblePositions, ExcludesLampsOutsideImageOrBelowCamera) {
   // At 1 m above the camera the image is 1.6 m wide: its edges are at +-0.8 m, -+0.6 m.
   const LampMap map = make_lamp_map({{0.7999, 0, 1},
                                      {0.8001, 0, 1},
@@ -37,28 +37,28 @@ TEST(FindVisibleLamps, ExcludesLampsOutsideImageOrBelowCamera) {
                                      {0, -0.5999, 1},
                                      {0, -0.6001, 1},
                                      {0, 0, -1}});
-  EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 4);
+  EXPECT_EQ(list_visible_positions(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 4);
 }
 
-TEST(FindVisibleLamps, ExcludesTruncatedLampsWhenDiameterIsKnown) {
+TEST(ListVisiblePositions, ExcludesTruncatedLampsWhenDiameterIsKnown) {
   LampMap map = make_lamp_map({{0.75, 0, 1}, {0, 0, 1}});
-  EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 2);
+  EXPECT_EQ(list_visible_positions(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 2);
   map.lamps[0].shape = map.lamps[1].shape = make_disc_lamp_shape(0.2);
-  const auto visible = find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0});
+  const auto visible = list_visible_positions(map, pinhole_camera(), {{0, 0, 0}, 0});
   ASSERT_EQ(visible.size(), 1);
   EXPECT_THAT(visible[0], IsNear(Eigen::Vector3d(0, 0, 1), 0));
 }
 
-TEST(FindVisibleLamps, ExcludesLampThatYawMovesOutOfImage) {
+TEST(ListVisiblePositions, ExcludesLampThatYawMovesOutOfImage) {
   const LampMap map = make_lamp_map({{0.7, 0, 1}});
-  EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 1);
-  EXPECT_EQ(find_visible_lamps(map, pinhole_camera(), {{0, 0, 0}, M_PI / 2}).size(), 0);
+  EXPECT_EQ(list_visible_positions(map, pinhole_camera(), {{0, 0, 0}, 0}).size(), 1);
+  EXPECT_EQ(list_visible_positions(map, pinhole_camera(), {{0, 0, 0}, M_PI / 2}).size(), 0);
 }
 
-TEST(ComputeAccuracyLimitsOnFloor, ReturnsPlacesOfGridRowByRow) {
+TEST(ComputeFloorLimits, ReturnsPlacesOfGridRowByRow) {
   const LampMap map = synthetic_lamps();
-  const auto limits = compute_accuracy_limits_on_floor(map, pinhole_camera(),
-                                                       {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
+  const auto limits =
+      compute_floor_limits(map, pinhole_camera(), {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
   ASSERT_EQ(limits.positions.size(), 4 * 3);
   ASSERT_FALSE(limits.sources.empty());
   EXPECT_THAT(limits.positions[5].camera.position_m, IsNear(Eigen::Vector3d(0.1, 0, 0.2), 1e-15));
@@ -67,7 +67,7 @@ TEST(ComputeAccuracyLimitsOnFloor, ReturnsPlacesOfGridRowByRow) {
   }
 }
 
-TEST(ComputeAccuracyLimitsOnFloor, TotalVarianceIncreasesWhenMotionAndTiltAreEstimated) {
+TEST(ComputeFloorLimits, TotalVarianceIncreasesWhenMotionAndTiltAreEstimated) {
   Camera camera = pinhole_camera();
   camera.row_time_s = 3e-5;
   camera.readout = Readout::rows;
@@ -75,10 +75,8 @@ TEST(ComputeAccuracyLimitsOnFloor, TotalVarianceIncreasesWhenMotionAndTiltAreEst
   prior.set_sd(kBodyVelocity, 1);
   prior.set_sd(kBodyRoll, 2);
   const FloorGrid grid{-1.5, 1.5, -0.3, 0.3, 0.3};
-  const auto standing =
-      compute_accuracy_limits_on_floor(synthetic_lamps(), camera, grid, 0.2, 0, kNoise);
-  const auto limits =
-      compute_accuracy_limits_on_floor(synthetic_lamps(), camera, grid, 0.2, 0, kNoise, prior);
+  const auto standing = compute_floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise);
+  const auto limits = compute_floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise, prior);
   ASSERT_EQ(limits.sources.size(), 6);
   EXPECT_EQ(limits.sources[1].key, "motion");
   EXPECT_EQ(limits.sources[2].key, "roll_pitch");
@@ -104,12 +102,11 @@ TEST(ComputeAccuracyLimitsOnFloor, TotalVarianceIncreasesWhenMotionAndTiltAreEst
   EXPECT_GT(without, 0) << "some see too few lamps for roll and pitch";
 }
 
-TEST(ComputeAccuracyLimitsOnFloor, NoiseCovarianceMatchesScatterOfFixesWithFisheye) {
+TEST(ComputeFloorLimits, NoiseCovarianceMatchesScatterOfFixesWithFisheye) {
   constexpr int draws = 4000;
   const FloorGrid grid{-1.2, 1.2, 0.2, 0.2, 0.8};
   SyntheticRig rig{synthetic_lamps(), {fisheye_camera(), {}, {}, {}, {}}, {}, {}};
-  const auto limits =
-      compute_accuracy_limits_on_floor(rig.map, rig.calibration.camera, grid, 0.2, 0.5, kNoise);
+  const auto limits = compute_floor_limits(rig.map, rig.calibration.camera, grid, 0.2, 0.5, kNoise);
   ASSERT_EQ(limits.positions.size(), 4);
   const Positioner positioner(rig.map, rig.calibration);
   Random random{23};
@@ -127,18 +124,17 @@ TEST(ComputeAccuracyLimitsOnFloor, NoiseCovarianceMatchesScatterOfFixesWithFishe
   }
 }
 
-TEST(ComputeAccuracyLimitsOnFloor, ReturnsNoCovariancesForPlaceWithoutVisibleLamps) {
-  const auto limits = compute_accuracy_limits_on_floor(synthetic_lamps(), pinhole_camera(),
-                                                       {50, 50, 0, 0, 1}, 0, 0, kNoise);
+TEST(ComputeFloorLimits, ReturnsNoCovariancesForPlaceWithoutVisibleLamps) {
+  const auto limits =
+      compute_floor_limits(synthetic_lamps(), pinhole_camera(), {50, 50, 0, 0, 1}, 0, 0, kNoise);
   ASSERT_EQ(limits.positions.size(), 1);
   EXPECT_EQ(limits.positions[0].lamps, 0);
   EXPECT_TRUE(limits.positions[0].covariances.empty());
 }
 
-TEST(ComputeAccuracyLimitsOnFloor, ThrowsOnInvalidGrid) {
+TEST(ComputeFloorLimits, ThrowsOnInvalidGrid) {
   const auto on = [](const FloorGrid& grid) {
-    return compute_accuracy_limits_on_floor(synthetic_lamps(), pinhole_camera(), grid, 0, 0,
-                                            kNoise);
+    return compute_floor_limits(synthetic_lamps(), pinhole_camera(), grid, 0, 0, kNoise);
   };
   EXPECT_THROW(on({0, 1, 0, 1, 0}), std::invalid_argument);
   EXPECT_THROW(on({0, 1, 0, 1, -1}), std::invalid_argument);
@@ -150,8 +146,8 @@ TEST(ComputeAccuracyLimitsOnFloor, ThrowsOnInvalidGrid) {
   EXPECT_THROW(on({0, 4000, 0, 2500, 1}), std::invalid_argument) << "10,006,501 places";
 }
 
-TEST(MakeGridOfFloorPositions, GridSpansBoundingBoxOfLamps) {
-  const FloorGrid grid = make_grid_of_floor_positions(synthetic_lamps(), 0.05);
+TEST(MakeFloorGrid, GridSpansBoundingBoxOfLamps) {
+  const FloorGrid grid = make_floor_grid(synthetic_lamps(), 0.05);
   EXPECT_EQ(grid.x_min_m, -0.8);
   EXPECT_EQ(grid.x_max_m, 0.8);
   EXPECT_EQ(grid.y_min_m, -0.5);

@@ -30,7 +30,7 @@ Evaluation evaluation() {
   input.truth = FileRows<TruthRow>{
       "truth.csv",
       {{"a", {0, 0}, 0, {}}, {"b", {0, 0}, {}, {}}, {"c", {0, 0}, {}, {}}, {"d", {0, 0}, {}, {}}}};
-  return evaluate_fix_accuracy(input);
+  return evaluate_fixes(input);
 }
 
 TEST(CheckGates, PassesOnlyIfValueDoesNotExceedLimit) {
@@ -40,13 +40,13 @@ TEST(CheckGates, PassesOnlyIfValueDoesNotExceedLimit) {
                                     {"missing_fraction", 0.25},
                                     {"missing_fraction", 0.249},
                                     {"height_rms_mm", 2.9}},
-                                   collect_evaluation_metrics(evaluation()));
+                                   collect_metrics(evaluation()));
   std::vector<bool> passed;
   for (const CheckedMetric& result : results) passed.push_back(result.has_passed_gate());
   ASSERT_EQ(passed, (std::vector<bool>{true, false, true, true, false, false}));
   EXPECT_NEAR(results[5].value.value(), 3, 1e-9);
   EXPECT_EQ(results[5].unit, "mm");
-  EXPECT_EQ(describe_gate_result(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is required");
+  EXPECT_EQ(describe_gate(results[5]), "height_rms_mm is 3 mm, at most 2.9 mm is required");
 }
 
 TEST(CheckGates, PassesValueEqualToUpperOrLowerLimit) {
@@ -54,29 +54,28 @@ TEST(CheckGates, PassesValueEqualToUpperOrLowerLimit) {
   EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.31}})[0].has_passed_gate());
   const auto coverage = check_gates({{"coverage", 0.7}}, {{"coverage", 0.69}});
   EXPECT_FALSE(coverage[0].has_passed_gate());
-  EXPECT_EQ(describe_gate_result(coverage[0]), "coverage is 0.69, at least 0.7 is required");
+  EXPECT_EQ(describe_gate(coverage[0]), "coverage is 0.69, at least 0.7 is required");
   EXPECT_EQ(describe_failed_gate(coverage[0]),
-            "the board views do not cover the image (" + describe_gate_result(coverage[0]) + ")");
+            "the board views do not cover the image (" + describe_gate(coverage[0]) + ")");
   EXPECT_TRUE(check_gates({{"coverage", 0.7}}, {{"coverage", 0.7}})[0].has_passed_gate());
 }
 
 TEST(CheckGates, TightensUpperAndLowerLimitsByGuardBand) {
   const auto of = [](const char* metric, double limit, double value) {
-    return check_all_metrics_against_gates({{metric, limit, GuardBand{0.01, 1.5}}},
-                                           {{metric, value}},
-                                           {find_metric_kind(metric).value()})[0];
+    return check_against_gates({{metric, limit, GuardBand{0.01, 1.5}}}, {{metric, value}},
+                               {find_metric_kind(metric).value()})[0];
   };
   EXPECT_TRUE(of("rms_px", 0.3, 0.2849).has_passed_gate());
   const CheckedMetric within = of("rms_px", 0.3, 0.286);
   EXPECT_FALSE(within.has_passed_gate());
-  EXPECT_EQ(describe_gate_result(within),
+  EXPECT_EQ(describe_gate(within),
             "rms_px is 0.286 px, at most 0.3 px less a guard band of 0.015 px is required");
   EXPECT_FALSE(check_gates({{"rms_px", 0.3, GuardBand{0.01, 1.5}}}, {{"rms_px", 0.286}})[0]
                    .has_passed_gate());
   EXPECT_TRUE(of("coverage", 0.7, 0.7151).has_passed_gate());
   const CheckedMetric below = of("coverage", 0.7, 0.714);
   EXPECT_FALSE(below.has_passed_gate());
-  EXPECT_EQ(describe_gate_result(below),
+  EXPECT_EQ(describe_gate(below),
             "coverage is 0.714, at least 0.7 and a guard band of 0.015 is required");
   // Tables of the normal distribution.
   EXPECT_NEAR(of("rms_px", 0.3, 0.286).conformance_probability().value(), 0.91924, 5e-6);
@@ -115,11 +114,11 @@ TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {
   EXPECT_NEAR(double(passed_at_limit) / clusters, 0.05, 0.005);
 }
 
-TEST(CheckAllMetricsAgainstGates, IncludesMetricsWithoutGateAndGatesWithoutValue) {
+TEST(CheckAgainstGates, IncludesMetricsWithoutGateAndGatesWithoutValue) {
   const double infinity = std::numeric_limits<double>::infinity();
   const auto known = list_metric_kinds({MetricSource::lens, MetricSource::rotation});
-  const auto all = check_all_metrics_against_gates({{"rms_px", 0.3}},
-                                                   {{"tilt_deg", 1}, {"rms_px", infinity}}, known);
+  const auto all =
+      check_against_gates({{"rms_px", 0.3}}, {{"tilt_deg", 1}, {"rms_px", infinity}}, known);
   ASSERT_EQ(all.size(), 2);
   EXPECT_EQ(all[0].name, "rms_px");
   EXPECT_FALSE(all[0].value);
@@ -145,10 +144,9 @@ TEST(CheckGates, FailsComparisonGateOnlyForEnoughClustersAndRelevantDifference) 
   QuantityComparison& horizontal = compared.comparison->quantities[0];
   horizontal.min_relevant = 1e-6;
   const auto passed = [&] {
-    return check_gates({{"worse_mm", 0}}, collect_evaluation_metrics(compared))[0]
-        .has_passed_gate();
+    return check_gates({{"worse_mm", 0}}, collect_metrics(compared))[0].has_passed_gate();
   };
-  EXPECT_FALSE(find_metric_value(collect_evaluation_metrics(compared), "worse_mm")) << "no pair";
+  EXPECT_FALSE(find_metric_value(collect_metrics(compared), "worse_mm")) << "no pair";
   compared.comparison->pairs = horizontal.pairs = horizontal.clusters = 19;
   horizontal.interval = {0.1, 1};
   EXPECT_TRUE(passed());
@@ -161,13 +159,13 @@ TEST(CheckGates, FailsComparisonGateOnlyForEnoughClustersAndRelevantDifference) 
   EXPECT_TRUE(passed());
 }
 
-TEST(MakeDefaultComparisonGates, HasOneForEachMeasuredMetricOfComparison) {
-  EXPECT_TRUE(make_default_comparison_gates(collect_evaluation_metrics(evaluation())).empty());
+TEST(MakeComparisonGates, HasOneForEachMeasuredMetricOfComparison) {
+  EXPECT_TRUE(make_comparison_gates(collect_metrics(evaluation())).empty());
   Evaluation compared = evaluation();
   compared.comparison = Comparison{};
   compared.comparison->pairs = compared.comparison->quantities[1].pairs = 1;
   std::vector<std::string> names;
-  for (const Gate& gate : make_default_comparison_gates(collect_evaluation_metrics(compared))) {
+  for (const Gate& gate : make_comparison_gates(collect_metrics(compared))) {
     EXPECT_EQ(gate.limit, 0);
     names.push_back(gate.metric);
   }
@@ -206,11 +204,11 @@ TEST(ParseGate, RejectsLimitOutsideRangeAndFormerOrUnknownMetric) {
 
 TEST(CheckGates, FailsGateWithoutValue) {
   const CheckedMetric gate = check_gates({{"split_half_px", 1}}, {{"rms_px", 0.1}})[0];
-  EXPECT_EQ(describe_gate_result(gate), "split_half_px is not known, at most 1 px is required");
-  const auto json = nlohmann::json::parse(format_evaluation_json(evaluation(), {gate}));
+  EXPECT_EQ(describe_gate(gate), "split_half_px is not known, at most 1 px is required");
+  const auto json = nlohmann::json::parse(format_evaluation(evaluation(), {gate}));
   EXPECT_TRUE(json["gates"][0]["value"].is_null());
   EXPECT_EQ(json["passed"], false);
-  const auto tests = make_junit_tests_from_gates(std::vector{gate});
+  const auto tests = make_gate_tests(std::vector{gate});
   ASSERT_EQ(tests.size(), 1);
   EXPECT_THAT(tests[0].message, HasSubstr("split_half_px is not known, at most 1 px"));
 }
@@ -246,10 +244,10 @@ TEST(ReadGates, ReturnsGatesOfFileAndRejectsInvalidFiles) {
   EXPECT_THAT(refusal("gates: {}\n"), HasSubstr("contains no gate"));
 }
 
-TEST(FormatEvaluationJson, WritesMetricsWithUnitsInKeys) {
-  const auto json = nlohmann::json::parse(
-      format_evaluation_json(evaluation(), check_gates({{"max_mm", 5}, {"missing_fraction", 1}},
-                                                       collect_evaluation_metrics(evaluation()))));
+TEST(FormatEvaluation, WritesMetricsWithUnitsInKeys) {
+  const auto json = nlohmann::json::parse(format_evaluation(
+      evaluation(),
+      check_gates({{"max_mm", 5}, {"missing_fraction", 1}}, collect_metrics(evaluation()))));
   EXPECT_EQ(json["format"], "vlp-evaluation/4");
   EXPECT_EQ(json["captures"], 4);
   EXPECT_EQ(json["missing"]["degenerate"], 1);
@@ -261,18 +259,18 @@ TEST(FormatEvaluationJson, WritesMetricsWithUnitsInKeys) {
   EXPECT_EQ(json["passed"], false);
 }
 
-TEST(FormatEvaluationJson, OmitsMissingP90IntervalAndStatesTooFewClusters) {
+TEST(FormatEvaluation, OmitsMissingP90IntervalAndStatesTooFewClusters) {
   Evaluation few = evaluation();
   const Interval interval{0.001, 0.002};
   few.intervals_m = {interval, interval, {}, interval, 19};
   few.comparison = Comparison{};
-  const auto json = nlohmann::json::parse(format_evaluation_json(few, {}));
+  const auto json = nlohmann::json::parse(format_evaluation(few, {}));
   EXPECT_FALSE(json["horizontal"]["intervals_95"].contains("p90_mm"));
   EXPECT_NEAR(json["horizontal"]["intervals_95"]["rms_mm"][1].get<double>(), 2, 1e-9);
   EXPECT_EQ(json["comparison"]["horizontal"]["reason"], "too few clusters");
   few.intervals_m->p90 = interval;
   few.comparison->quantities[0].clusters = 20;
-  const auto sufficient = nlohmann::json::parse(format_evaluation_json(few, {}));
+  const auto sufficient = nlohmann::json::parse(format_evaluation(few, {}));
   EXPECT_NEAR(sufficient["horizontal"]["intervals_95"]["p90_mm"][0].get<double>(), 1, 1e-9);
   EXPECT_FALSE(sufficient["comparison"]["horizontal"].contains("reason"));
 }

@@ -9,11 +9,11 @@
 namespace vlp {
 namespace {
 
-TEST(MakeJunitTestsFromGates, MarksOnlyGatesThatDidNotPassAsFailed) {
+TEST(MakeGateTests, MarksOnlyGatesThatDidNotPassAsFailed) {
   const std::vector<CheckedMetric> gates{{"mean_mm", "mm", 1.25, 1, Direction::at_most},
                                          {"missing_fraction", "", 0, 0, Direction::at_most},
                                          {"split_half_px", "px", {}, 1, Direction::at_most}};
-  const auto tests = make_junit_tests_from_gates(gates);
+  const auto tests = make_gate_tests(gates);
   ASSERT_EQ(tests.size(), 3);
   EXPECT_EQ(tests[0].name, "mean_mm");
   EXPECT_EQ(tests[0].result, JUnitTest::Result::failed);

@@ -34,14 +34,13 @@ EvaluationInput draw_run(std::size_t count, unsigned seed, double height_scale =
   return input;
 }
 
-TEST(ProposeGatesFromEvaluation, OtherRunOfSameAccuracyPassesProposedGates) {
+TEST(ProposeGates, OtherRunOfSameAccuracyPassesProposedGates) {
   int exceeded = 0, checked = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
     const EvaluationInput first = draw_run(40, 2 * seed), second = draw_run(40, 2 * seed + 1);
-    const auto gates = propose_gates_from_evaluation(first, evaluate_fix_accuracy(first));
+    const auto gates = propose_gates(first, evaluate_fixes(first));
     ASSERT_EQ(gates.size(), 5);
-    for (const auto& gate :
-         check_gates(gates, collect_evaluation_metrics(evaluate_fix_accuracy(second)))) {
+    for (const auto& gate : check_gates(gates, collect_metrics(evaluate_fixes(second)))) {
       if (gate.name == "missing_fraction") continue;
       ++checked;
       if (!gate.has_passed_gate()) ++exceeded;
@@ -52,21 +51,20 @@ TEST(ProposeGatesFromEvaluation, OtherRunOfSameAccuracyPassesProposedGates) {
   EXPECT_LE(exceeded, 5);
 }
 
-TEST(ProposeGatesFromEvaluation, RunWithTripledHeightErrorsFailsProposedGates) {
+TEST(ProposeGates, RunWithTripledHeightErrorsFailsProposedGates) {
   const EvaluationInput good = draw_run(40, 1), wrong = draw_run(40, 2, 3);
-  const auto gates = propose_gates_from_evaluation(good, evaluate_fix_accuracy(good));
+  const auto gates = propose_gates(good, evaluate_fixes(good));
   ASSERT_FALSE(gates.empty());
-  EXPECT_THAT(describe_failed_gates(
-                  check_gates(gates, collect_evaluation_metrics(evaluate_fix_accuracy(wrong)))),
+  EXPECT_THAT(describe_failed_gates(check_gates(gates, collect_metrics(evaluate_fixes(wrong)))),
               HasSubstr("height_rms_mm is"));
 }
 
-TEST(ProposeGatesFromEvaluation, ProposesLimitsSlightlyAboveErrorsWithoutScatter) {
+TEST(ProposeGates, ProposesLimitsSlightlyAboveErrorsWithoutScatter) {
   EvaluationInput input = draw_run(8, 1);
   for (std::size_t i = 0; i < 8; ++i) {
     input.fixes.rows[i].fix->pose = {{static_cast<double>(i) + 1e-3, 0, 0}, 0};
   }
-  const auto gates = propose_gates_from_evaluation(input, evaluate_fix_accuracy(input));
+  const auto gates = propose_gates(input, evaluate_fixes(input));
   ASSERT_EQ(gates.size(), 4) << "p90 needs 20 units";
   EXPECT_EQ(gates[0].metric, "mean_mm");
   EXPECT_NEAR(gates[0].limit, 1.01, 1e-9);
@@ -76,29 +74,28 @@ TEST(ProposeGatesFromEvaluation, ProposesLimitsSlightlyAboveErrorsWithoutScatter
   EXPECT_EQ(gates[3].limit, 0);
 }
 
-TEST(ProposeGatesFromEvaluation, ReturnsNoGatesForFewerThanFivePositions) {
+TEST(ProposeGates, ReturnsNoGatesForFewerThanFivePositions) {
   const EvaluationInput input = draw_run(4, 1);
-  EXPECT_TRUE(propose_gates_from_evaluation(input, evaluate_fix_accuracy(input)).empty());
+  EXPECT_TRUE(propose_gates(input, evaluate_fixes(input)).empty());
 }
 
-TEST(ProposeGatesFromEvaluation, RunPassesItsOwnGatesDespiteMissingFixes) {
+TEST(ProposeGates, RunPassesItsOwnGatesDespiteMissingFixes) {
   EvaluationInput input = draw_run(21, 1);
   for (std::size_t i = 0; i < 7; ++i) input.fixes.rows[3 * i].fix.reset();
-  const Evaluation evaluation = evaluate_fix_accuracy(input);
+  const Evaluation evaluation = evaluate_fixes(input);
   ASSERT_NEAR(evaluation.missing_fix_fraction(), 1.0 / 3, 1e-12);
   const TemporaryFolder folder;
   const auto gates = read_gates(
-      folder.file("gates.yaml",
-                  format_gates(propose_gates_from_evaluation(input, evaluation), evaluation)),
+      folder.file("gates.yaml", format_gates(propose_gates(input, evaluation), evaluation)),
       list_metric_kinds({MetricSource::evaluation}));
   ASSERT_FALSE(gates.empty());
-  EXPECT_EQ(describe_failed_gates(check_gates(gates, collect_evaluation_metrics(evaluation))), "");
+  EXPECT_EQ(describe_failed_gates(check_gates(gates, collect_metrics(evaluation))), "");
 }
 
 TEST(FormatGates, ReadGatesReturnsFormattedGates) {
   const EvaluationInput input = draw_run(40, 1);
-  const Evaluation evaluation = evaluate_fix_accuracy(input);
-  const auto gates = propose_gates_from_evaluation(input, evaluation);
+  const Evaluation evaluation = evaluate_fixes(input);
+  const auto gates = propose_gates(input, evaluation);
   const TemporaryFolder folder;
   const auto read = read_gates(folder.file("gates.yaml", format_gates(gates, evaluation)),
                                list_metric_kinds({MetricSource::evaluation}));

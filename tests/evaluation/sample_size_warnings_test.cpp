@@ -27,61 +27,61 @@ Evaluation evaluation(std::size_t clusters) {
   return evaluation;
 }
 
-TEST(MakeMissingFixesWarning, WarnsIfNoneOfTheGatesLimitsMissingFixes) {
+TEST(WarnAboutMissingFixes, WarnsIfNoneOfTheGatesLimitsMissingFixes) {
   const auto gates = check_gates({{"mean_mm", 2}, {"missing_fraction", 1}},
                                  {{"mean_mm", 1}, {"missing_fraction", 0.9}});
   const CheckedMetric &mean = gates[0], &missing = gates[1];
-  EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {mean}),
+  EXPECT_EQ(warn_about_missing_fixes(evaluation(50), {mean}),
             "393 of 432 captures have no fix, and there is no gate 'missing_fraction'");
-  EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {mean, missing}), "");
-  EXPECT_EQ(make_missing_fixes_warning(evaluation(50), {}), "");
+  EXPECT_EQ(warn_about_missing_fixes(evaluation(50), {mean, missing}), "");
+  EXPECT_EQ(warn_about_missing_fixes(evaluation(50), {}), "");
   Evaluation all = evaluation(50);
   all.fixes = all.captures - 1;
-  EXPECT_THAT(make_missing_fixes_warning(all, {mean}), HasSubstr("1 of 432 captures has no fix"));
+  EXPECT_THAT(warn_about_missing_fixes(all, {mean}), HasSubstr("1 of 432 captures has no fix"));
   all.fixes = all.captures;
-  EXPECT_EQ(make_missing_fixes_warning(all, {mean}), "");
+  EXPECT_EQ(warn_about_missing_fixes(all, {mean}), "");
 }
 
-TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyReferencePoints) {
-  EXPECT_THAT(make_sample_size_warnings(evaluation(50)), IsEmpty());
+TEST(WarnAboutSampleSize, WarnsForFewerThanFiftyReferencePoints) {
+  EXPECT_THAT(warn_about_sample_size(evaluation(50)), IsEmpty());
   EXPECT_THAT(
-      make_sample_size_warnings(evaluation(49)),
+      warn_about_sample_size(evaluation(49)),
       ElementsAre("with only 49 reference points intervals are somewhat too narrow, that of p90 "
                   "most"));
-  EXPECT_THAT(make_sample_size_warnings(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
+  EXPECT_THAT(warn_about_sample_size(evaluation(19)), ElementsAre(HasSubstr("p90 has none")));
   Evaluation path = evaluation(30);  // as many runs as a path ever has
   path.reference = "path";
-  EXPECT_THAT(make_sample_size_warnings(path), IsEmpty());
+  EXPECT_THAT(warn_about_sample_size(path), IsEmpty());
   Evaluation none = evaluation(4);
   none.intervals_m = {};
-  EXPECT_THAT(make_sample_size_warnings(none),
+  EXPECT_THAT(warn_about_sample_size(none),
               ElementsAre("there are too few reference points with a fix for intervals"));
 }
 
-TEST(MakeErrorsBelowCrlbWarning, WarnsIfErrorsAreSignificantlyBelowCrlb) {
+TEST(WarnAboutCrlb, WarnsIfErrorsAreSignificantlyBelowCrlb) {
   Evaluation limited = evaluation(1000);
-  EXPECT_EQ(make_errors_below_crlb_warning(limited), "");
+  EXPECT_EQ(warn_about_crlb(limited), "");
   limited.crlb_ratio = CrlbRatio{0.609, 1e-3, 36, 1.0 / 12};
-  EXPECT_THAT(make_errors_below_crlb_warning(limited),
+  EXPECT_THAT(warn_about_crlb(limited),
               AllOf(HasSubstr("0.609 times the theoretical limit: either the stated pixel noise is "
                               "too large, or the fixes use more information than one image"),
                     Not(HasSubstr("nothing beats"))));
   limited.crlb_ratio->horizontal = 0.9;
-  EXPECT_EQ(make_errors_below_crlb_warning(limited), "");
+  EXPECT_EQ(warn_about_crlb(limited), "");
 }
 
-TEST(MakeSampleSizeWarnings, WarnsForFewerThanFiftyReferencePointsInComparison) {
+TEST(WarnAboutSampleSize, WarnsForFewerThanFiftyReferencePointsInComparison) {
   Evaluation compared = evaluation(1000);
   compared.comparison = Comparison{};
   compared.comparison->quantities[0].clusters = 8;
-  EXPECT_THAT(make_sample_size_warnings(compared),
+  EXPECT_THAT(warn_about_sample_size(compared),
               ElementsAre("with only 8 reference points with a fix in both files the comparison is "
                           "inconclusive; it needs 20"));
   compared.comparison->quantities[0].clusters = 49;
-  EXPECT_THAT(make_sample_size_warnings(compared),
+  EXPECT_THAT(warn_about_sample_size(compared),
               ElementsAre(HasSubstr("49 reference points with a fix in both")));
   compared.comparison->quantities[0].clusters = 50;
-  EXPECT_THAT(make_sample_size_warnings(compared), IsEmpty());
+  EXPECT_THAT(warn_about_sample_size(compared), IsEmpty());
 }
 
 }  // namespace

@@ -44,9 +44,8 @@ std::vector<std::size_t> all_lamps() {
   return lamps;
 }
 
-UnitBudget compute_unit_fix_error_budget(const StatedRig& rig) {
-  return *UnitErrors(rig.map, rig.calibration)
-              .compute_unit_fix_error_budget(rig.camera, all_lamps(), kNoise_px);
+UnitBudget compute_budget(const StatedRig& rig) {
+  return *UnitErrors(rig.map, rig.calibration).compute_budget(rig.camera, all_lamps(), kNoise_px);
 }
 
 /// seen_from() does not apply the dispersion.
@@ -70,7 +69,7 @@ TEST_P(UnitErrorsParts, BudgetTermsSumToFixCovarianceOfLevelCamera) {
   const Fix fix = Positioner(rig.map, rig.calibration).compute_position_fix(make_detections(rig));
   ASSERT_TRUE(fix.has_succeeded());
   ASSERT_EQ(fix.lamps, 8);
-  const UnitBudget budget = compute_unit_fix_error_budget(rig);
+  const UnitBudget budget = compute_budget(rig);
   const Eigen::Matrix4d common = (fix.covariance - fix.noise_covariance).topLeftCorner<4, 4>();
   const Eigen::Vector4d sd = fix.pose_covariance().diagonal().cwiseSqrt();
   const Eigen::Matrix4d scale = sd * sd.transpose();
@@ -103,7 +102,7 @@ TEST_P(UnitErrorsParts, BudgetTermsSumToFixCovarianceWithUnknownMotion) {
   prior.set_sd(kBodyYawRate, 0.5);
   prior.set_sd(kBodyRoll, 0.1);
   const auto budget = UnitErrors(rig.map, rig.calibration)
-                          .compute_unit_fix_error_budget(rig.camera, all_lamps(), kNoise_px, prior);
+                          .compute_budget(rig.camera, all_lamps(), kNoise_px, prior);
   ASSERT_TRUE(budget);
   const Eigen::Vector4d sd = fix.pose_covariance().diagonal().cwiseSqrt();
   const Eigen::Matrix4d scale = sd * sd.transpose();
@@ -124,23 +123,23 @@ TEST_P(UnitErrorsParts, BudgetTermsSumToFixCovarianceWithUnknownMotion) {
 TEST_P(UnitErrorsParts, CovariancesOfErrorSourcesSumToJointCovariance) {
   const StatedRig& rig = GetParam();
   const UnitErrors unit(rig.map, rig.calibration);
-  const Eigen::MatrixXd& whole = unit.common_errors().joint_error_covariance();
+  const Eigen::MatrixXd& whole = unit.common_errors().joint_covariance();
   ASSERT_GT(whole.rows(), 0);
   Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(whole.rows(), whole.cols());
   for (const CommonErrorSource part : kCommonErrorSources)
-    sum += unit.common_errors().isolate_error_source(part).joint_error_covariance();
+    sum += unit.common_errors().isolate_error_source(part).joint_covariance();
   const Eigen::VectorXd inverse_sd = whole.diagonal().cwiseSqrt().cwiseInverse();
   EXPECT_THAT(inverse_sd.asDiagonal() * (sum - whole) * inverse_sd.asDiagonal(),
               IsNear(Eigen::MatrixXd::Zero(whole.rows(), whole.cols()), 1e-13));
 }
 
 TEST_P(UnitErrorsParts, BudgetTermsArePositiveSemidefinite) {
-  const UnitBudget budget = compute_unit_fix_error_budget(GetParam());
+  const UnitBudget budget = compute_budget(GetParam());
   for (const Matrix4& part :
        {budget.noise, budget.lens, budget.zenith, budget.offset, budget.lamp_map}) {
     const Eigen::Vector4d sd = budget.total_pose_covariance().diagonal().cwiseSqrt().cwiseInverse();
     const Eigen::MatrixXd scaled = sd.asDiagonal() * part * sd.asDiagonal();
-    EXPECT_GT(eigendecompose_symmetric_matrix(scaled).values.minCoeff(), -1e-9);
+    EXPECT_GT(eigendecompose(scaled).values.minCoeff(), -1e-9);
   }
 }
 
@@ -155,7 +154,7 @@ TEST(UnitErrors, BudgetTermIsZeroForQuantityWithoutError) {
     MatrixX& left = other.calibration.covariance->matrix;
     left.middleRows(first, size).setZero();
     left.middleCols(first, size).setZero();
-    return compute_unit_fix_error_budget(other);
+    return compute_budget(other);
   };
   const UnitBudget lens = without(0, 12), zenith = without(12, 2), map = without(16, 24);
   EXPECT_TRUE(lens.lens.isZero(0) && zenith.zenith.isZero(0) && map.lamp_map.isZero(0));
@@ -164,7 +163,7 @@ TEST(UnitErrors, BudgetTermIsZeroForQuantityWithoutError) {
     EXPECT_TRUE(budget.offset.isZero(0));
   }
   covariance.setZero();
-  EXPECT_TRUE(compute_unit_fix_error_budget(rig).common_covariance().isZero(0));
+  EXPECT_TRUE(compute_budget(rig).common_covariance().isZero(0));
 }
 
 TEST(CommonErrors, IsolatedErrorSourceIsUnknownIfItsVarianceIsZero) {
@@ -173,7 +172,7 @@ TEST(CommonErrors, IsolatedErrorSourceIsUnknownIfItsVarianceIsZero) {
     return UnitErrors(rig.map, rig.calibration)
         .common_errors()
         .isolate_error_source(CommonErrorSource::lens)
-        .are_any_errors_known();
+        .has_known_errors();
   };
   EXPECT_TRUE(is_lens_error_known());
   MatrixX& covariance = rig.calibration.covariance->matrix;
@@ -189,7 +188,7 @@ TEST(UnitErrors, BudgetExistsOnlyForLampsAboveCamera) {
   const auto has_budget_at = [&](double above_lamp_m) {
     Pose camera = rig.camera;
     camera.position_m.z() = rig.map.lamps[0].position_m.z() + above_lamp_m;
-    return unit.compute_unit_fix_error_budget(camera, lamps, kNoise_px).has_value();
+    return unit.compute_budget(camera, lamps, kNoise_px).has_value();
   };
   EXPECT_TRUE(has_budget_at(-0.5));
   EXPECT_FALSE(has_budget_at(0.01));
@@ -197,11 +196,11 @@ TEST(UnitErrors, BudgetExistsOnlyForLampsAboveCamera) {
 
 /// Each part of sequential steps results from the covariance of one step alone.
 TEST(UnitErrors, BudgetTermEqualsBudgetWithOnlyThatError) {
-  const UnitBudget whole = compute_unit_fix_error_budget(in_a_row());
+  const UnitBudget whole = compute_budget(in_a_row());
   const auto compute_with = [](std::array<double, 4> errors) {
     StatedRig rig;
     rig.calibrate_in_a_row(errors);
-    return compute_unit_fix_error_budget(rig).common_covariance();
+    return compute_budget(rig).common_covariance();
   };
   const double small = 1e-9 * whole.common_covariance().cwiseAbs().maxCoeff();
   EXPECT_THAT(whole.lens, IsNear(compute_with({1, 0, 0, 0}), small));
@@ -213,7 +212,7 @@ TEST(UnitErrors, BudgetTermEqualsBudgetWithOnlyThatError) {
 /// Fixes with calibrations and maps drawn from the reported covariance, and with pixel noise.
 TEST(UnitErrors, BudgetMatchesFixErrorsOfRandomlyDrawnCalibrations) {
   const StatedRig rig = adjusted();
-  const UnitBudget budget = compute_unit_fix_error_budget(rig);
+  const UnitBudget budget = compute_budget(rig);
   const auto exact = make_detections(rig);
   const Eigen::MatrixXd root = rig.calibration.covariance->matrix.llt().matrixL();
   Random random(11);
@@ -224,9 +223,8 @@ TEST(UnitErrors, BudgetMatchesFixErrorsOfRandomlyDrawnCalibrations) {
     Eigen::VectorXd draw(root.cols());
     for (double& one : draw) one = random.normal();
     const Eigen::VectorXd error = root * draw;
-    Calibration calibration = add_error_to_calibrated_zenith(
-        add_error_to_calibrated_intrinsics(rig.calibration, error.head<12>()),
-        error.segment<2>(12));
+    Calibration calibration = add_zenith_error(
+        add_intrinsics_error(rig.calibration, error.head<12>()), error.segment<2>(12));
     calibration.adjustment.reset();
     calibration.covariance.reset();
     LampMap map = rig.map;
@@ -257,11 +255,9 @@ TEST(ComputeFixSds, ReturnsZeroForTinyNegativeVariances) {
 TEST(UnitErrors, IsErrorSourceKnownOrAbsentIsFalseForSourcesWithoutSd) {
   StatedRig rig;
   const auto stated = [&](CommonErrorSource part) {
-    return UnitErrors(rig.map, rig.calibration)
-        .common_errors()
-        .is_error_source_known_or_absent(part);
+    return UnitErrors(rig.map, rig.calibration).common_errors().is_known_or_absent(part);
   };
-  EXPECT_FALSE(UnitErrors(rig.map, rig.calibration).common_errors().are_any_errors_known());
+  EXPECT_FALSE(UnitErrors(rig.map, rig.calibration).common_errors().has_known_errors());
   EXPECT_FALSE(stated(CommonErrorSource::lens) || stated(CommonErrorSource::zenith) ||
                stated(CommonErrorSource::lamps));
   EXPECT_TRUE(stated(CommonErrorSource::offset));  // there is none
@@ -269,7 +265,7 @@ TEST(UnitErrors, IsErrorSourceKnownOrAbsentIsFalseForSourcesWithoutSd) {
   for (const CommonErrorSource part : kCommonErrorSources) EXPECT_TRUE(stated(part));
   rig.map.lamps[3].sd_m.reset();
   const Dispersion dispersion = *rig.calibration.dispersion;
-  rig.calibration = remove_dispersion_from_calibration(rig.calibration);
+  rig.calibration = remove_dispersion(rig.calibration);
   rig.calibration.dispersion = dispersion;
   EXPECT_FALSE(stated(CommonErrorSource::lamps) || stated(CommonErrorSource::offset));
 }
@@ -289,10 +285,8 @@ TEST(UnitErrors, BudgetIsNulloptUnlessThereAre2To256Lamps) {
   for (const std::size_t count : {1u, 2u, 256u, 257u, 300u}) {
     const std::span<const std::size_t> some(lamps.data(), count);
     const bool possible = count == 2 || count == 256;
-    EXPECT_EQ(unit.compute_unit_fix_error_budget(rig.camera, some, kNoise_px).has_value(), possible)
-        << count;
-    EXPECT_EQ(unit.compute_unit_fix_error_budget(rig.camera, some, kNoise_px, prior).has_value(),
-              possible)
+    EXPECT_EQ(unit.compute_budget(rig.camera, some, kNoise_px).has_value(), possible) << count;
+    EXPECT_EQ(unit.compute_budget(rig.camera, some, kNoise_px, prior).has_value(), possible)
         << count;
   }
 }
@@ -302,22 +296,20 @@ TEST(UnitErrors, FindFullyVisibleLampIndicesAppliesCalibratedTilt) {
   rig.map = make_lamp_map({{0, 0, 1.6}, {0.1, 0, 1.6}});
   rig.camera = {{0, 0, 0}, 0};
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.9, 0);
-  EXPECT_TRUE(
-      UnitErrors(rig.map, rig.calibration).find_fully_visible_lamp_indices(rig.camera).empty());
+  EXPECT_TRUE(UnitErrors(rig.map, rig.calibration).list_visible_lamps(rig.camera).empty());
   rig.calibration.rotation_center = tilted_by(rig.calibration.camera, 0.1, 0);
-  EXPECT_EQ(UnitErrors(rig.map, rig.calibration).find_fully_visible_lamp_indices(rig.camera).size(),
-            2U);
+  EXPECT_EQ(UnitErrors(rig.map, rig.calibration).list_visible_lamps(rig.camera).size(), 2U);
 }
 
 TEST(FloorSummary, LargestErrorSourceIsOneWithLargestVariance) {
   StatedRig rig = in_a_row();
   const auto summary_of = [&](double map_sd_m, double noise_px) {
     for (Lamp& lamp : rig.map.lamps) lamp.sd_m = map_sd_m;
-    const FloorLimits limits = compute_accuracy_limits_on_floor(
-        UnitErrors(rig.map, rig.calibration), {-0.2, 0.2, -0.1, 0.1, 0.1}, 0, 0.4, noise_px);
+    const FloorLimits limits = compute_floor_limits(UnitErrors(rig.map, rig.calibration),
+                                                    {-0.2, 0.2, -0.1, 0.1, 0.1}, 0, 0.4, noise_px);
     EXPECT_EQ(limits.sources.size(), 5U);
     EXPECT_EQ(limits.positions.size(), 15U);
-    return summarize_floor_limits(limits).value();
+    return summarize_limits(limits).value();
   };
   EXPECT_EQ(summary_of(0.01, 0.1).largest_error_source().source.key, "lamp_map");
   EXPECT_EQ(summary_of(1e-5, 5).largest_error_source().source.key, "noise");
@@ -326,8 +318,8 @@ TEST(FloorSummary, LargestErrorSourceIsOneWithLargestVariance) {
   for (const auto& source : summary.sources) sum_of_fractions += source.fraction;
   EXPECT_NEAR(sum_of_fractions, 1, 1e-12);
   rig.calibration.dispersion.reset();
-  const FloorLimits without = compute_accuracy_limits_on_floor(UnitErrors(rig.map, rig.calibration),
-                                                               {0, 0, 0, 0, 0.1}, 0, 0.4, 0.1);
+  const FloorLimits without =
+      compute_floor_limits(UnitErrors(rig.map, rig.calibration), {0, 0, 0, 0, 0.1}, 0, 0.4, 0.1);
   EXPECT_EQ(without.sources.size(), 4U);
 }
 

@@ -39,10 +39,10 @@ struct BoardIntakeOfFolder : testing::Test {
   /// Returns the observation of an image with these pixels.
   Observation observe(const cv::Mat& image) const {
     return BoardIntake(board, options, std::array{good.cols, good.rows})
-        .detect_board_in_image(SourceImage(write("image.png", image)));
+        .detect_board(SourceImage(write("image.png", image)));
   }
   Observations observe_all() const {
-    return detect_boards_in_images(list_images(folder / ""), board, "board.yaml", options);
+    return detect_boards(list_images(folder / ""), board, "board.yaml", options);
   }
 };
 
@@ -121,7 +121,7 @@ TEST_F(BoardIntakeOfFolder, RejectsBlurThatIsLargeForTags) {
   cv::GaussianBlur(image, image, {}, 1.4);
   const Observation blurred = observe(image);
   ASSERT_TRUE(blurred.board);
-  ASSERT_TRUE(blurred.board->detection.has_detected_corners());
+  ASSERT_TRUE(blurred.board->detection.has_corners());
   EXPECT_EQ(rejection_reason(blurred), RejectionReason::blurred);
   ASSERT_TRUE(blurred.rejection);
   EXPECT_THAT(blurred.rejection->message, HasSubstr("at most for tags of"));
@@ -172,12 +172,11 @@ TEST_F(BoardIntakeOfFolder, ReturnsSameCornersWithOneAndFourThreads) {
   std::size_t last = 0;
   const Observations one = observe_all();
   options.threads = 4;
-  const Observations four =
-      detect_boards_in_images(list_images(folder / ""), board, "board.yaml", options,
-                              [&](std::size_t done, std::size_t total) {
-                                last = done;
-                                EXPECT_EQ(total, 6U);
-                              });
+  const Observations four = detect_boards(list_images(folder / ""), board, "board.yaml", options,
+                                          [&](std::size_t done, std::size_t total) {
+                                            last = done;
+                                            EXPECT_EQ(total, 6U);
+                                          });
   EXPECT_EQ(last, 6U);
   ASSERT_EQ(four.images.size(), 6U);
   ASSERT_EQ(one.images.size(), 6U);
@@ -218,7 +217,7 @@ TEST_F(BoardIntakeOfFolder, RejectsRepeatedImagesAndViews) {
   EXPECT_EQ(seen.images[2].rejection->message, "shows the same view as a.png: views count once");
   EXPECT_TRUE(seen.images[3].is_image_kept());
   EXPECT_FALSE(seen.failure);
-  EXPECT_EQ(collect_board_views_of_kept_images(seen.images).size(), 2U);
+  EXPECT_EQ(collect_board_views(seen.images).size(), 2U);
 }
 
 TEST_F(BoardIntakeOfFolder, RejectsImagesOfMinoritySize) {
@@ -256,9 +255,9 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetectionButAppliesCurrentLimits) {
   const fs::path file = write("a.png", good);
   options.corner_cache = folder / "cache";
   const BoardIntake intake(board, options);
-  const Observation detected = intake.detect_board_in_image(SourceImage(file));
+  const Observation detected = intake.detect_board(SourceImage(file));
   ASSERT_FALSE(fs::is_empty(options.corner_cache));
-  const Observation cached = intake.detect_board_in_image(SourceImage(file));
+  const Observation cached = intake.detect_board(SourceImage(file));
   ASSERT_TRUE(detected.board && cached.board);
   ASSERT_TRUE(detected.blur_px);
   ASSERT_FALSE(detected.board->detection.tags.empty());
@@ -268,10 +267,10 @@ TEST_F(BoardIntakeOfFolder, ReturnsCachedDetectionButAppliesCurrentLimits) {
   // The stored figures count, not the image.
   CornerCache(options.corner_cache, board)
       .store_cached_view(SourceImage(file), {*detected.board, 1.25, 0.9, 0.1});
-  EXPECT_EQ(intake.detect_board_in_image(SourceImage(file)).blur_px, 1.25);
+  EXPECT_EQ(intake.detect_board(SourceImage(file)).blur_px, 1.25);
   // Limits are no part of the cache.
   options.max_blur_fraction = 0.0001;
-  EXPECT_EQ(rejection_reason(BoardIntake(board, options).detect_board_in_image(SourceImage(file))),
+  EXPECT_EQ(rejection_reason(BoardIntake(board, options).detect_board(SourceImage(file))),
             RejectionReason::blurred);
 }
 

@@ -30,7 +30,7 @@ TEST(CornerCache, TruncatedFileYieldsSameDetectionAndIsRewritten) {
   options.corner_cache = folder / "cache";
   const auto view = [&] {
     const fs::path image = rig / "sample-boards/0000.png";
-    return BoardIntake(board, options).detect_board_in_image(SourceImage(image)).board.value();
+    return BoardIntake(board, options).detect_board(SourceImage(image)).board.value();
   };
   const BoardView whole = view();
   ASSERT_GE(whole.detection.tags.size(), 20U);

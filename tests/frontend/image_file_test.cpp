@@ -28,14 +28,14 @@ TEST_P(ReadImageSizeFromHeaderOfFormat, ReturnsSizeOfImage) {
   for (const Size size : {Size{1, 1}, Size{2, 100}, Size{641, 3}, Size{300, 517}}) {
     const std::string bytes =
         encoded_as(GetParam(), static_cast<int>(size[0]), static_cast<int>(size[1]));
-    EXPECT_EQ(read_image_size_from_header(bytes), size);
+    EXPECT_EQ(read_header_size(bytes), size);
   }
 }
 
 TEST_P(ReadImageSizeFromHeaderOfFormat, ReturnsSizeOrNulloptForTruncatedFile) {
   const std::string bytes = encoded_as(GetParam(), 33, 21);
   for (std::size_t length = 0; length < bytes.size(); ++length) {
-    const auto size = read_image_size_from_header(std::string_view(bytes).substr(0, length));
+    const auto size = read_header_size(std::string_view(bytes).substr(0, length));
     EXPECT_TRUE(!size || *size == (Size{33, 21})) << length;
   }
 }
@@ -44,30 +44,30 @@ INSTANTIATE_TEST_SUITE_P(Formats, ReadImageSizeFromHeaderOfFormat,
                          testing::Values(".png", ".jpg", ".bmp", ".tif", ".pgm"),
                          [](const auto& ending) { return std::string(ending.param + 1); });
 
-TEST(ReadImageSizeFromHeader, ReturnsSizeOfBigTiff) {
+TEST(ReadHeaderSize, ReturnsSizeOfBigTiff) {
   std::string bytes("II+\0\x08\0\0\0\x10\0\0\0\0\0\0\0", 16);
   bytes += std::string("\x02\0\0\0\0\0\0\0", 8);
   bytes += std::string("\0\x01\x04\0\x01\0\0\0\0\0\0\0\x20\x4e\0\0\0\0\0\0", 20);
   bytes += std::string("\x01\x01\x03\0\x01\0\0\0\0\0\0\0\x2c\x01\0\0\0\0\0\0", 20);
-  EXPECT_EQ(read_image_size_from_header(bytes), (Size{20000, 300}));
+  EXPECT_EQ(read_header_size(bytes), (Size{20000, 300}));
   for (std::size_t length = 0; length < 58; ++length) {
-    EXPECT_FALSE(read_image_size_from_header(std::string_view(bytes).substr(0, length))) << length;
+    EXPECT_FALSE(read_header_size(std::string_view(bytes).substr(0, length))) << length;
   }
 }
 
-TEST(ReadImageSizeFromHeader, ReturnsNulloptForFilesThatAreNoImages) {
-  EXPECT_FALSE(read_image_size_from_header(""));
-  EXPECT_FALSE(read_image_size_from_header("no image"));
-  EXPECT_FALSE(read_image_size_from_header("P5 # never ends"));
+TEST(ReadHeaderSize, ReturnsNulloptForFilesThatAreNoImages) {
+  EXPECT_FALSE(read_header_size(""));
+  EXPECT_FALSE(read_header_size("no image"));
+  EXPECT_FALSE(read_header_size("P5 # never ends"));
 }
 
-TEST(ReadImageSizeFromHeader, SkipsNonMarkerBytesInJpeg) {
+TEST(ReadHeaderSize, SkipsNonMarkerBytesInJpeg) {
   std::string bytes = encoded_as(".jpg", 33, 21);
   bytes.insert(2, std::string("\x01\xff\x00\x02", 4));
-  EXPECT_EQ(read_image_size_from_header(bytes), (Size{33, 21}));
+  EXPECT_EQ(read_header_size(bytes), (Size{33, 21}));
 }
 
-TEST(ReadImageSizeFromHeader, SkipsJpegMarkersWithoutLength) {
+TEST(ReadHeaderSize, SkipsJpegMarkersWithoutLength) {
   // Read as lengths, the two bytes behind the marker lead to the frame header in the comment.
   std::string comment("\xff\xe1\xff\xff", 4);
   const std::string small("\xff\xc0\0\x0b\x08\0\x10\0\x10", 9);
@@ -77,12 +77,12 @@ TEST(ReadImageSizeFromHeader, SkipsJpegMarkersWithoutLength) {
   for (const std::string marker : {"\xff\xd0", "\xff\xd7", "\xff\x01"}) {
     std::string bytes = encoded_as(".jpg", 33, 21);
     bytes.insert(2, marker + comment);
-    EXPECT_EQ(read_image_size_from_header(bytes), (Size{33, 21}));
+    EXPECT_EQ(read_header_size(bytes), (Size{33, 21}));
   }
   for (const std::string marker : {"\xff\xd8", "\xff\xd9"}) {
     std::string bytes = encoded_as(".jpg", 33, 21);
     bytes.insert(2, marker);
-    EXPECT_FALSE(read_image_size_from_header(bytes));
+    EXPECT_FALSE(read_header_size(bytes));
   }
 }
 
@@ -94,14 +94,13 @@ std::string make_tiff(const std::vector<std::string>& entries) {
   return bytes + std::string(4, '\0');
 }
 
-TEST(ReadImageSizeFromHeader, UsesFirstOfRepeatedTagsOfTiff) {
+TEST(ReadHeaderSize, UsesFirstOfRepeatedTagsOfTiff) {
   const std::string width("\0\x01\x04\0\x01\0\0\0\x30\x75\0\0", 12),
       height("\x01\x01\x04\0\x01\0\0\0\x2c\x01\0\0", 12),
       small_width("\0\x01\x04\0\x01\0\0\0\x02\0\0\0", 12),
       elsewhere("\0\x01\x10\0\x01\0\0\0\x08\0\0\0", 12);  // a LONG8 at byte 8
-  EXPECT_EQ(read_image_size_from_header(make_tiff({width, height, small_width})),
-            (Size{30000, 300}));
-  EXPECT_FALSE(read_image_size_from_header(make_tiff({elsewhere, height})));
+  EXPECT_EQ(read_header_size(make_tiff({width, height, small_width})), (Size{30000, 300}));
+  EXPECT_FALSE(read_header_size(make_tiff({elsewhere, height})));
 }
 
 TEST(ReadImage, ReportsTruncatedFilesAsCutShortOrDamaged) {

@@ -10,12 +10,12 @@
 namespace vlp {
 namespace {
 
-TEST(ProcessImagesInParallel, RunsTaskOncePerImageWithOneOpencvThread) {
+TEST(ProcessImages, RunsTaskOncePerImageWithOneOpencvThread) {
   cv::setNumThreads(4);
   constexpr std::size_t count = 50;
   std::vector<int> times(count), threads(count);
   std::vector<std::size_t> done;
-  process_images_in_parallel(
+  process_images(
       count, 3,
       [&](std::size_t i) {
         ++times[i];

@@ -14,9 +14,7 @@ const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample"
 
 std::vector<Observation> sample_lights() {
   const LightDetector detector({}, {Readout::rows, {}, {}});
-  return LampIntake(detector, ImageUse::fixes, {}, {})
-      .detect_lamps_in_all_images(list_images(kSample))
-      .images;
+  return LampIntake(detector, ImageUse::fixes, {}, {}).detect_in_all(list_images(kSample)).images;
 }
 
 TEST(AddLabeledLights, AddsOneLightPerLabelOfTable) {
@@ -57,24 +55,24 @@ TEST(AddLabeledLights, CountsLabelOfLightCutByBorderAsWithoutLight) {
   EXPECT_GT(labeled.num_labels_without_light, 0);
 }
 
-TEST(CollectLightPeriods, ReturnsPeriodsOfAllLightsOrOnlyLabeledOnes) {
+TEST(CollectPeriods, ReturnsPeriodsOfAllLightsOrOnlyLabeledOnes) {
   const auto images = sample_lights();
-  const auto all = collect_light_periods(images, {});
+  const auto all = collect_periods(images, {});
   EXPECT_GE(all.size(), 8);
   EXPECT_FALSE(all[0].lamp);
   auto labels = read_detections(kSample + "/true_detections.csv");
   labels.pop_back();
-  const auto some = collect_light_periods(images, labels);
+  const auto some = collect_periods(images, labels);
   EXPECT_LE(some.size(), 6);
   EXPECT_GE(some.size(), 4);
   for (const MeasuredPeriod& period : some) EXPECT_TRUE(period.lamp);
 }
 
-TEST(CollectLightPeriods, ReturnsPeriodsOfLightsCutByBorder) {
+TEST(CollectPeriods, ReturnsPeriodsOfLightsCutByBorder) {
   auto images = sample_lights();
-  const std::size_t all = collect_light_periods(images, {}).size();
+  const std::size_t all = collect_periods(images, {}).size();
   for (Observation& image : images) image.size_px = {400, 300};
-  EXPECT_EQ(collect_light_periods(images, {}).size(), all);
+  EXPECT_EQ(collect_periods(images, {}).size(), all);
 }
 
 }  // namespace

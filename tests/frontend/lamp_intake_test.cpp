@@ -70,9 +70,9 @@ TEST_F(LampIntakeOfImage, RejectsImageOfOtherSize) {
 TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
   const Observation image = observe(read_image(kRig + "/sample/0000.png"));
   EXPECT_TRUE(image.is_image_kept());
-  EXPECT_GE(collect_identified_lamps(image).size(), 4U);
-  EXPECT_EQ(collect_lamp_frames_of_kept_images(std::vector{image}).at(0).detections.size(),
-            collect_identified_lamps(image).size());
+  EXPECT_GE(list_identified(image).size(), 4U);
+  EXPECT_EQ(collect_lamp_frames(std::vector{image}).at(0).detections.size(),
+            list_identified(image).size());
   for (const Light& light : image.lights) EXPECT_TRUE(light.outline.empty());
 }
 
@@ -80,10 +80,10 @@ TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
 TEST_F(LampIntakeOfImage, KeepsDarkImageWhenUsedForFixes) {
   const Observation image = observe(ceiling(2, 0.5, 2), ImageUse::fixes);
   EXPECT_TRUE(image.is_image_kept());
-  EXPECT_TRUE(collect_identified_lamps(image).empty());
+  EXPECT_TRUE(list_identified(image).empty());
 }
 
-TEST(DetectLampsInImages, RejectsRepeatedImagesUnlessUsedForFixes) {
+TEST(DetectLamps, RejectsRepeatedImagesUnlessUsedForFixes) {
   const TemporaryFolder folder;
   for (const char* name : {"a.png", "b.png"}) {
     std::filesystem::copy_file(kRig + "/sample/0000.png", folder / name);
@@ -92,7 +92,7 @@ TEST(DetectLampsInImages, RejectsRepeatedImagesUnlessUsedForFixes) {
   folder.file("d.png", "no image");
   const LampImages images{folder / "", read_lamp_map(kRig + "/lamps.yaml"), "lamps.yaml",
                           read_calibration(kRig + "/true_calibration.yaml"), "calibration.yaml"};
-  const Observations turn = detect_lamps_in_images(images, ImageUse::rotation, {});
+  const Observations turn = detect_lamps(images, ImageUse::rotation, {});
   ASSERT_EQ(turn.images.size(), 4U);
   EXPECT_TRUE(turn.images[0].is_image_kept());
   ASSERT_FALSE(turn.images[1].is_image_kept());
@@ -100,11 +100,8 @@ TEST(DetectLampsInImages, RejectsRepeatedImagesUnlessUsedForFixes) {
   EXPECT_TRUE(turn.images[2].is_image_kept());
   ASSERT_FALSE(turn.images[3].is_image_kept());
   EXPECT_EQ(turn.images[3].rejection->reason, RejectionReason::unreadable);
-  EXPECT_EQ(collect_lamp_frames_of_kept_images(turn.images).size(), 2U);
-  EXPECT_EQ(
-      collect_lamp_frames_of_kept_images(detect_lamps_in_images(images, ImageUse::fixes, {}).images)
-          .size(),
-      3U);
+  EXPECT_EQ(collect_lamp_frames(turn.images).size(), 2U);
+  EXPECT_EQ(collect_lamp_frames(detect_lamps(images, ImageUse::fixes, {}).images).size(), 3U);
 }
 
 }  // namespace

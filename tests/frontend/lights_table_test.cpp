@@ -54,7 +54,7 @@ TEST(WriteLightsTable, WritesOneRowPerLight) {
   const CsvTable table(folder / "lights.csv");
   ASSERT_EQ(table.num_rows(), 3U);
   const auto text = [&](std::size_t row, const char* column) {
-    return std::string(table.get_cell_text(row, table.get_required_column(column)));
+    return std::string(table.get_cell_text(row, table.require_column(column)));
   };
   EXPECT_EQ(text(0, "image"), "a, b.png");
   EXPECT_EQ(text(0, "kind"), "lamp");
@@ -79,7 +79,7 @@ TEST(WriteLightsTable, WritesOneRowPerLight) {
   EXPECT_THROW(write_lights_table(folder / "no" / "lights.csv", {}), InputError);
 }
 
-TEST(CountRejectedLightsByReason, SortsByCountWithFormlessLightsLast) {
+TEST(CountRejectedLights, SortsByCountWithFormlessLightsLast) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
   const Light soft = light_of_kind(LightKind::unknown, LightReason::reflection);
@@ -87,7 +87,7 @@ TEST(CountRejectedLightsByReason, SortsByCountWithFormlessLightsLast) {
   const Light small = light_of_kind(LightKind::no_outline, LightReason::incomplete);
   const std::vector images{image_with("a.png", {small, small, lamp, soft, even}),
                            image_with("b.png", {small, even, lamp})};
-  const auto reasons = count_rejected_lights_by_reason(images);
+  const auto reasons = count_rejected_lights(images);
   ASSERT_EQ(reasons.size(), 3U);
   EXPECT_EQ(reasons[0].reason, LightReason::unmodulated);
   EXPECT_EQ(reasons[0].lights, 2);
@@ -95,8 +95,8 @@ TEST(CountRejectedLightsByReason, SortsByCountWithFormlessLightsLast) {
   EXPECT_EQ(reasons[1].kind, LightKind::unknown);
   EXPECT_EQ(reasons[2].reason, LightReason::incomplete) << "though it is the most frequent";
   EXPECT_EQ(reasons[2].lights, 3);
-  EXPECT_EQ(count_lights_of_kind(images, LightKind::lamp), 2);
-  EXPECT_EQ(count_lights_of_kind(images, LightKind::truncated), 0);
+  EXPECT_EQ(count_lights(images, LightKind::lamp), 2);
+  EXPECT_EQ(count_lights(images, LightKind::truncated), 0);
 }
 
 TEST(LightReasonText, NameAndDescriptionAreUniqueForEachReason) {

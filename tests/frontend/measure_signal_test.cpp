@@ -29,19 +29,19 @@ void add_lamp(cv::Mat& image, double height) {
   }
 }
 
-TEST(MeasureImageSignalToNoise, ReturnsSignalToNoiseBelowSevenForPureNoise) {
+TEST(MeasureImageSignal, ReturnsSignalToNoiseBelowSevenForPureNoise) {
   for (const double sd : {20., 300.}) {
-    EXPECT_LT(measure_image_signal_to_noise(noise(5000, sd)).signal_to_noise, 7) << sd;
-    EXPECT_GT(measure_image_signal_to_noise(noise(5000, sd)).signal_to_noise, 2) << sd;
+    EXPECT_LT(measure_image_signal(noise(5000, sd)).signal_to_noise, 7) << sd;
+    EXPECT_GT(measure_image_signal(noise(5000, sd)).signal_to_noise, 2) << sd;
   }
 }
 
-TEST(MeasureImageSignalToNoise, ReturnsSignalToNoiseOfLamp) {
+TEST(MeasureImageSignal, ReturnsSignalToNoiseOfLamp) {
   for (const double times : {10., 30., 100.}) {
     constexpr double sd = 50;
     cv::Mat image = noise(2000, sd);
     add_lamp(image, times * sd);
-    const ImageSignal signal = measure_image_signal_to_noise(image);
+    const ImageSignal signal = measure_image_signal(image);
     // The noise's own range is about 6; the lamp's edges are a little of what is taken for noise.
     EXPECT_GT(signal.signal_to_noise, 0.9 * times) << times;
     EXPECT_LT(signal.signal_to_noise, times + 7) << times;
@@ -49,29 +49,29 @@ TEST(MeasureImageSignalToNoise, ReturnsSignalToNoiseOfLamp) {
   }
 }
 
-TEST(MeasureImageSignalToNoise, SignalToNoiseIgnoresSingleHotPixel) {
+TEST(MeasureImageSignal, SignalToNoiseIgnoresSingleHotPixel) {
   cv::Mat image = noise(2000, 50);
   image.at<unsigned short>(20, 30) = 65535;
-  EXPECT_LT(measure_image_signal_to_noise(image).signal_to_noise, 7);
+  EXPECT_LT(measure_image_signal(image).signal_to_noise, 7);
 }
 
-TEST(MeasureImageSignalToNoise, ReturnsHighSignalToNoiseForStripesOfOneScanline) {
+TEST(MeasureImageSignal, ReturnsHighSignalToNoiseForStripesOfOneScanline) {
   for (const bool rows : {true, false}) {
     cv::Mat image = noise(2000, 50);
     for (int i = 100; i < 200; i += 4) {
       image(rows ? cv::Rect(100, i, 100, 1) : cv::Rect(i, 100, 1, 100)) += 2000;
     }
-    EXPECT_GT(measure_image_signal_to_noise(image).signal_to_noise, 20) << rows;
+    EXPECT_GT(measure_image_signal(image).signal_to_noise, 20) << rows;
   }
 }
 
 /// Without noise only the rounding remains: one level is 3.5 times its standard deviation.
-TEST(MeasureImageSignalToNoise, AssumesAtLeastRoundingNoise) {
+TEST(MeasureImageSignal, AssumesAtLeastRoundingNoise) {
   cv::Mat1b image(300, 400, static_cast<unsigned char>(2));
-  EXPECT_EQ(measure_image_signal_to_noise(image).signal_to_noise, 0);
+  EXPECT_EQ(measure_image_signal(image).signal_to_noise, 0);
   image(cv::Rect(10, 10, 20, 20)) = static_cast<unsigned char>(3);
-  EXPECT_NEAR(measure_image_signal_to_noise(image).signal_to_noise, std::sqrt(12), 1e-9);
-  EXPECT_NEAR(measure_image_signal_to_noise(image).dark_fraction, 2.0 / 255, 1e-9);
+  EXPECT_NEAR(measure_image_signal(image).signal_to_noise, std::sqrt(12), 1e-9);
+  EXPECT_NEAR(measure_image_signal(image).dark_fraction, 2.0 / 255, 1e-9);
 }
 
 }  // namespace

@@ -20,11 +20,11 @@ const std::filesystem::path kImage = kRig + "/sample/0000.png";
 Observation observe(const std::function<void(const cv::Mat&)>& detect,
                     const std::optional<std::array<int, 2>>& imager_px = std::nullopt) {
   Observation image{kImage};
-  read_image_and_run_detection(SourceImage(kImage), {}, imager_px, image, detect);
+  read_and_detect(SourceImage(kImage), {}, imager_px, image, detect);
   return image;
 }
 
-TEST(ReadImageAndRunDetection, PassesDecodedImageToDetector) {
+TEST(ReadAndDetect, PassesDecodedImageToDetector) {
   cv::Size size;
   const Observation image = observe([&](const cv::Mat& pixels) { size = pixels.size(); });
   EXPECT_TRUE(image.is_image_kept());
@@ -32,7 +32,7 @@ TEST(ReadImageAndRunDetection, PassesDecodedImageToDetector) {
   EXPECT_EQ(image.size_px, (std::array{800, 600}));
 }
 
-TEST(ReadImageAndRunDetection, RejectsImageForDetectorErrorWrongSizeOrMissingFile) {
+TEST(ReadAndDetect, RejectsImageForDetectorErrorWrongSizeOrMissingFile) {
   const Observation broken =
       observe([](const cv::Mat&) { throw std::runtime_error("first\nsecond"); });
   ASSERT_FALSE(broken.is_image_kept());
@@ -42,19 +42,17 @@ TEST(ReadImageAndRunDetection, RejectsImageForDetectorErrorWrongSizeOrMissingFil
   EXPECT_EQ(other.rejection->reason, RejectionReason::wrong_size);
   EXPECT_EQ(other.rejection->message, "is 800 x 600 px, the camera's images are 640 x 480 px");
   Observation missing{"none.png"};
-  read_image_and_run_detection(SourceImage("none.png"), {}, {}, missing,
-                               [](const cv::Mat&) { FAIL(); });
+  read_and_detect(SourceImage("none.png"), {}, {}, missing, [](const cv::Mat&) { FAIL(); });
   ASSERT_FALSE(missing.is_image_kept());
   EXPECT_EQ(missing.rejection->reason, RejectionReason::unreadable);
   EXPECT_EQ(missing.rejection->message, "cannot be opened: No such file or directory");
 }
 
-TEST(ReadImageAndRunDetection, RejectsImageAboveMaxMegapixelsWithoutCallingDetector) {
+TEST(ReadAndDetect, RejectsImageAboveMaxMegapixelsWithoutCallingDetector) {
   FrontendOptions options;
   options.max_mpx = 0.1;
   Observation image{kImage};
-  read_image_and_run_detection(SourceImage(kImage), options, {}, image,
-                               [](const cv::Mat&) { FAIL(); });
+  read_and_detect(SourceImage(kImage), options, {}, image, [](const cv::Mat&) { FAIL(); });
   ASSERT_FALSE(image.is_image_kept());
   EXPECT_EQ(image.rejection->reason, RejectionReason::unreadable);
   EXPECT_THAT(image.rejection->message, HasSubstr("more than the 0.1 million"));
@@ -64,38 +62,38 @@ std::vector<Observation> rejected(const std::vector<RejectionReason>& reasons) {
   std::vector<Observation> images(1, Observation{"good.png"});
   for (const RejectionReason reason : reasons) {
     Observation image{"bad.png"};
-    image.set_image_rejection(reason, "why");
+    image.reject(reason, "why");
     images.push_back(image);
   }
   return images;
 }
 
-TEST(SummarizeImageRejections, CountsReasonsAndNamesRemedyOfMajority) {
+TEST(SummarizeRejectedImages, CountsReasonsAndNamesRemedyOfMajority) {
   using enum RejectionReason;
-  EXPECT_EQ(summarize_image_rejections(rejected({})), "");
-  EXPECT_EQ(summarize_image_rejections(rejected({blurred, too_dark, too_dark})),
+  EXPECT_EQ(summarize_rejected_images(rejected({})), "");
+  EXPECT_EQ(summarize_rejected_images(rejected({blurred, too_dark, too_dark})),
             "2 too dark, 1 blurred: more exposure, gain or light");
-  EXPECT_EQ(summarize_image_rejections(rejected({blurred, overexposed})),
+  EXPECT_EQ(summarize_rejected_images(rejected({blurred, overexposed})),
             "1 overexposed, 1 blurred");
 }
 
-TEST(RejectionReasonPhrase, ReturnsUniqueNonEmptyPhraseForEachReason) {
+TEST(ReasonPhrase, ReturnsUniqueNonEmptyPhraseForEachReason) {
   std::set<std::string_view> names;
   int count = 0;
   for (auto reason = RejectionReason::unreadable; reason <= RejectionReason::used_elsewhere;
        reason = static_cast<RejectionReason>(static_cast<int>(reason) + 1)) {
-    EXPECT_FALSE(rejection_reason_phrase(reason).empty());
-    names.insert(rejection_reason_phrase(reason));
+    EXPECT_FALSE(reason_phrase(reason).empty());
+    names.insert(reason_phrase(reason));
     ++count;
   }
   EXPECT_EQ(std::ssize(names), count);
 }
 
-TEST(CheckAnyImageReadable, ThrowsReasonOfFirstImageWhenNoneIsUsable) {
+TEST(CheckAnyReadable, ThrowsReasonOfFirstImageWhenNoneIsUsable) {
   auto images = rejected({RejectionReason::unreadable, RejectionReason::wrong_size});
-  EXPECT_NO_THROW(check_any_image_readable("folder", images));
+  EXPECT_NO_THROW(check_any_readable("folder", images));
   images.erase(images.begin());
-  EXPECT_EQ(rejection_message([&] { check_any_image_readable("folder", images); }),
+  EXPECT_EQ(rejection_message([&] { check_any_readable("folder", images); }),
             "folder: none of its 2 images can be used; the first, bad.png: why");
 }
 

@@ -26,7 +26,7 @@ Observation image_of_lamps(const std::string& name, const std::vector<Eigen::Vec
 
 /// Returns the reasons of the images, after a selection; std::nullopt for those that are kept.
 std::vector<std::optional<RejectionReason>> select(std::vector<Observation> images, ImageUse use) {
-  reject_repeated_images(images, use, {});
+  reject_repeated(images, use, {});
   std::vector<std::optional<RejectionReason>> reasons;
   for (const Observation& image : images) {
     reasons.push_back(image.is_image_kept() ? std::nullopt
@@ -64,7 +64,7 @@ TEST(Selection, KeepsViewThatSharesOnlyHalfOfLamps) {
 
 TEST(Selection, KeepsCopyOfRejectedImage) {
   auto images = std::vector{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
-  images[0].set_image_rejection(RejectionReason::blurred, "blurred");
+  images[0].reject(RejectionReason::blurred, "blurred");
   EXPECT_EQ(select(images, ImageUse::rotation), (Reasons{RejectionReason::blurred, {}}));
 }
 
@@ -77,7 +77,7 @@ TEST(Selection, RejectsCopyOfImageAddedByAddKeptImage) {
   std::vector images{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
   Selection selection(ImageUse::rotation, {});
   selection.add_kept_image(images[0]);
-  selection.add_image_or_reject_as_repeated(images[1]);
+  selection.add_or_reject(images[1]);
   ASSERT_FALSE(images[1].is_image_kept());
   EXPECT_EQ(images[1].rejection->message, "is the same image as a");
 }

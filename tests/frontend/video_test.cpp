@@ -63,11 +63,11 @@ class VideoOfFrames : public testing::Test {
 TEST(VideoFrameNames, ContainNumberAndAreParsedBackToVideo) {
   EXPECT_TRUE(is_video_file_name("a/drive.MP4"));
   EXPECT_FALSE(is_video_file_name("a/drive.png"));
-  EXPECT_EQ(make_video_frame_name("drive.mp4", 123), "drive.mp4#000123");
-  EXPECT_EQ(make_video_frame_name("drive.mp4", 1234567), "drive.mp4#1234567");
-  EXPECT_EQ(parse_video_name_from_frame_name("drive.mp4#000123"), "drive.mp4");
+  EXPECT_EQ(make_frame_name("drive.mp4", 123), "drive.mp4#000123");
+  EXPECT_EQ(make_frame_name("drive.mp4", 1234567), "drive.mp4#1234567");
+  EXPECT_EQ(parse_video_name("drive.mp4#000123"), "drive.mp4");
   for (const char* other : {"drive.mp4", "drive.mp4#", "drive.mp4#12a", "a.png#000123"}) {
-    EXPECT_EQ(parse_video_name_from_frame_name(other), std::nullopt) << other;
+    EXPECT_EQ(parse_video_name(other), std::nullopt) << other;
   }
 }
 
@@ -83,7 +83,7 @@ TEST_F(VideoOfFrames, ReturnsAllFramesWithTimes) {
     EXPECT_EQ(cv::norm(frame->image, frames[std::size_t(i)], cv::NORM_INF), 0);
   }
   EXPECT_FALSE(video.read_next_frame());
-  EXPECT_EQ(video.describe_missing_frames(), "");
+  EXPECT_EQ(video.describe_missing(), "");
 }
 
 TEST_F(VideoOfFrames, SourceReturnsEveryNthFrameBetweenImages) {
@@ -132,7 +132,7 @@ TEST_F(VideoOfFrames, ReadingContinuesAfterDamagedFrames) {
   EXPECT_GT(count, 33U);
   EXPECT_LT(count, 39U);
   EXPECT_NEAR(last_s, 1.95, 1e-9);
-  EXPECT_THAT(video.describe_missing_frames(), HasSubstr(" of its 40 frames can be decoded"));
+  EXPECT_THAT(video.describe_missing(), HasSubstr(" of its 40 frames can be decoded"));
 }
 
 TEST_F(VideoOfFrames, SourceThrowsForInvalidOrWronglySizedVideos) {
@@ -168,9 +168,7 @@ TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   const auto seen = [&](const std::vector<fs::path>& sources, int threads) {
     FrontendOptions options;
     options.threads = threads;
-    return LampIntake(detector, ImageUse::fixes, options, {})
-        .detect_lamps_in_all_images(sources)
-        .images;
+    return LampIntake(detector, ImageUse::fixes, options, {}).detect_in_all(sources).images;
   };
   const auto of_images = seen(files, 1), of_film = seen({film}, 3);
   ASSERT_EQ(of_images.size(), files.size());
@@ -179,9 +177,8 @@ TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   EXPECT_EQ(of_film[1].image_file_name(), "film.avi#000001");
   EXPECT_NEAR(of_film[1].time_s.value(), 0.05, 1e-9);
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const auto one = collect_identified_lamps(of_images[i]),
-               other = collect_identified_lamps(of_film[i]);
-    EXPECT_EQ(of_film[i].image_file_name(), make_video_frame_name("film.avi", i));
+    const auto one = list_identified(of_images[i]), other = list_identified(of_film[i]);
+    EXPECT_EQ(of_film[i].image_file_name(), make_frame_name("film.avi", i));
     ASSERT_EQ(one.size(), other.size());
     EXPECT_GE(one.size(), 4U);
     for (std::size_t k = 0; k < one.size(); ++k) {
@@ -204,7 +201,7 @@ TEST_F(VideoOfFrames, YieldsSameBoardCornersAsImages) {
     FrontendOptions options;
     options.threads = 2;
     options.corner_cache = folder / "cache";
-    const auto seen = detect_boards_in_images({film}, board, "board.yaml", options).images;
+    const auto seen = detect_boards({film}, board, "board.yaml", options).images;
     ASSERT_EQ(seen.size(), 2U);
     EXPECT_EQ(seen[1].image_file_name(), "film.avi#000001");
     ASSERT_TRUE(seen[0].board && seen[1].board);

@@ -14,23 +14,23 @@ namespace {
 
 using Points = std::vector<Eigen::Vector2d>;
 
-TEST(ComputeEnclosingCircle, IsExactForOneOrTwoDistinctPoints) {
-  EXPECT_EQ(compute_enclosing_circle(Points{{3, 4}}).radius, 0);
-  const Circle pair = compute_enclosing_circle(Points{{0, 0}, {0, 2}});
+TEST(EncloseInCircle, IsExactForOneOrTwoDistinctPoints) {
+  EXPECT_EQ(enclose_in_circle(Points{{3, 4}}).radius, 0);
+  const Circle pair = enclose_in_circle(Points{{0, 0}, {0, 2}});
   EXPECT_THAT(pair.center, IsNear(Eigen::Vector2d(0, 1), 1e-15));
   EXPECT_NEAR(pair.radius, 1, 1e-15);
-  EXPECT_EQ(compute_enclosing_circle(Points(5, {3, 4})).radius, 0);
+  EXPECT_EQ(enclose_in_circle(Points(5, {3, 4})).radius, 0);
 }
 
-TEST(ComputeEnclosingCircle, HasOutermostPointsAsDiameterForCollinearPoints) {
-  const Circle circle = compute_enclosing_circle(Points{{1, 1}, {0, 0}, {3, 3}, {2, 2}});
+TEST(EncloseInCircle, HasOutermostPointsAsDiameterForCollinearPoints) {
+  const Circle circle = enclose_in_circle(Points{{1, 1}, {0, 0}, {3, 3}, {2, 2}});
   EXPECT_THAT(circle.center, IsNear(Eigen::Vector2d(1.5, 1.5), 1e-12));
   EXPECT_NEAR(circle.radius, 1.5 * std::sqrt(2), 1e-12);
 }
 
 /// The circle contains all points, and no smaller circle does: its center is in the convex hull of
 /// the points on its rim, so that these do not lie on one side of the center.
-TEST(ComputeEnclosingCircle, ReturnsSmallestCircleContainingAllPoints) {
+TEST(EncloseInCircle, ReturnsSmallestCircleContainingAllPoints) {
   Random random(1);
   for (int draw = 0; draw < 200; ++draw) {
     Points points;
@@ -38,7 +38,7 @@ TEST(ComputeEnclosingCircle, ReturnsSmallestCircleContainingAllPoints) {
     for (std::size_t i = 0; i < count; ++i) {
       points.emplace_back(1000 + random.normal(), 2 * random.normal());
     }
-    const Circle circle = compute_enclosing_circle(points);
+    const Circle circle = enclose_in_circle(points);
     Points rim;
     for (const auto& point : points) {
       const double distance = (point - circle.center).norm();

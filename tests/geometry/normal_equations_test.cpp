@@ -32,7 +32,7 @@ TEST(NormalEquations, SolutionAndInverseMatchWeightedLeastSquares) {
   }
   const Cholesky<kUnknowns> factor(normal);
   ASSERT_TRUE(factor.has_full_rank(1e-3));
-  const auto step = factor.solve_normal_equations(normal.gradient);
+  const auto step = factor.solve_system(normal.gradient);
   EXPECT_THAT(Vector(Vector::Map(step.data())),
               IsNear(Vector(information.inverse() * gradient), 1e-12));
   Matrix inverse;

@@ -55,11 +55,10 @@ TEST(SigmasOfOneInTenThousand, MatchesUpperTailOfNormalDistribution) {
   EXPECT_NEAR(normal_upper_tail(kSigmasOfOneInTenThousand), 1e-4, 1e-7);
 }
 
-TEST(ComputeSquaredStudentTBound, IsExceededAsRarelyAsSigmasOfNormalDistribution) {
+TEST(ComputeSquaredTBound, IsExceededAsRarelyAsSigmasOfNormalDistribution) {
   for (const double sigmas : {1.0, 1.96, 3.0, kSigmasOfOneInTenThousand, 4.5}) {
     for (const double m : kDegreesOfFreedom) {
-      const double tail =
-          student_upper_tail(std::sqrt(compute_squared_student_t_bound(sigmas, m)), m);
+      const double tail = student_upper_tail(std::sqrt(compute_squared_t_bound(sigmas, m)), m);
       EXPECT_GT(find_sigmas(tail), sigmas - 0.01) << m;
       EXPECT_LT(find_sigmas(tail), sigmas + (m < 8 ? 0.3 : 0.03)) << m;
     }
@@ -79,7 +78,7 @@ TEST(ComputeChiSquaredBound, IsExceededAsRarelyAsSigmasOfNormalDistribution) {
 TEST(StatisticalBounds, ApproachSigmasOfNormalDistributionForManyDegreesOfFreedom) {
   constexpr double m = 1e9;
   for (const double sigmas : kSigmas) {
-    EXPECT_NEAR(compute_squared_student_t_bound(sigmas, m), sigmas * sigmas, 1e-6);
+    EXPECT_NEAR(compute_squared_t_bound(sigmas, m), sigmas * sigmas, 1e-6);
     EXPECT_NEAR((compute_chi_squared_bound(sigmas, m) - m) / std::sqrt(2 * m), sigmas, 1e-3);
   }
 }

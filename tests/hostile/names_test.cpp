@@ -163,13 +163,13 @@ TEST_F(HostileNames, EscapeTextForSingleLineReturnsOneHarmlessLine) {
   int as_they_are = 0;
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
-    const std::string line = escape_text_for_single_line(name);
+    const std::string line = escape_for_line(name);
     ASSERT_TRUE(is_harmless(line)) << line;
-    ASSERT_EQ(escape_text_for_single_line(line), line);
+    ASSERT_EQ(escape_for_line(line), line);
     if (line == name) ++as_they_are;
     const std::string message = InputError(name, name).what();
     ASSERT_EQ(message.find('\n'), std::string::npos);
-    ASSERT_TRUE(is_harmless(escape_text_for_single_line(message)));
+    ASSERT_TRUE(is_harmless(escape_for_line(message)));
   }
   EXPECT_GT(as_they_are, kNames / 100) << "some are good";
 }
@@ -179,7 +179,7 @@ TEST_F(HostileNames, IdAcceptsOnlySinglePathComponents) {
   const fs::path root = "/results";
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
-    if (!Id::is_valid_name_of_camera_or_run(name)) {
+    if (!Id::is_valid(name)) {
       const std::string refusal = rejection_message([&] { Id(name, "spool/a.json", "camera"); });
       ASSERT_NE(refusal, "");
       ASSERT_LT(refusal.size(), 300U);
@@ -206,12 +206,11 @@ TEST_F(HostileNames, SharedFolderOpensNoFileOutsideIt) {
       if (file < 0) continue;  // too long
       ::close(file);
       ++made;
-      ASSERT_TRUE(shared.contains_folder_entry(name));
-      if (i % 1000 == 0) shared.replace_file_atomically(name, name);
+      ASSERT_TRUE(shared.contains(name));
+      if (i % 1000 == 0) shared.replace_file(name, name);
       if (i % 10 == 0) shared.rename_file(name, "renamed");
       shared.remove_file(name);
-      if (Id::is_valid_name_of_camera_or_run(name))
-        shared.open_or_create_subfolder({name, "test", "camera"});
+      if (Id::is_valid(name)) shared.open_or_create({name, "test", "camera"});
     } catch (const InputError&) {
       continue;
     }
@@ -242,17 +241,16 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
     ASSERT_NE(
         rejection_message([&] { ::close(shared.open_regular_file(name, O_WRONLY | O_TRUNC)); }), "")
         << name;
-    ASSERT_NE(rejection_message([&] { (void)shared.read_file_if_exists(name, kMaxBytes); }), "")
-        << name;
-    shared.replace_file_atomically(name, name);
+    ASSERT_NE(rejection_message([&] { (void)shared.read_if_exists(name, kMaxBytes); }), "") << name;
+    shared.replace_file(name, name);
     ASSERT_FALSE(fs::is_symlink(link)) << name;
     shared.remove_file(name);
-    if (!Id::is_valid_name_of_camera_or_run(name)) continue;
+    if (!Id::is_valid(name)) continue;
     ++folders;
     ASSERT_EQ(::symlink((folder / "outside").c_str(), link.c_str()), 0);
     const Id id{name, "test", "camera"};
-    ASSERT_NE(rejection_message([&] { (void)shared.open_or_create_subfolder(id); }), "") << name;
-    ASSERT_NE(rejection_message([&] { (void)shared.open_subfolder_if_exists(id); }), "") << name;
+    ASSERT_NE(rejection_message([&] { (void)shared.open_or_create(id); }), "") << name;
+    ASSERT_NE(rejection_message([&] { (void)shared.open_if_exists(id); }), "") << name;
     shared.remove_file(name);
     ASSERT_EQ(TemporaryFolder::read_content(canary), "mine") << name;
   }
@@ -265,7 +263,7 @@ TEST_F(HostileNames, SharedFolderFollowsNoLinkOutOfIt) {
 TEST_F(HostileNames, ParseRunDocumentReturnsEscapedNames) {
   constexpr int every = 20;  // parsing takes long without optimization
   for (int i = 0; i < kNames; ++i) {
-    const std::string name = random_name(random), escaped = escape_text_for_single_line(name);
+    const std::string name = random_name(random), escaped = escape_for_line(name);
     const std::string document = serialize_run(run_with(name, i));
     if (i % every != 0) continue;
     const RunRecord run = parse_run_document(document);
@@ -290,7 +288,7 @@ TEST_F(HostileNames, UnitReportContainsNoHtmlTagsFromNames) {
   const auto report = [](const std::string& name) {
     RunRecord run = run_with(name, 0);
     run.events.clear();
-    return make_run_report_html(escape_texts_of_run(std::move(run)), {}, {});
+    return make_run_report(escape_run(std::move(run)), {}, {});
   };
   const std::string plain = extract_tags(report("a"));
   ASSERT_GT(plain.size(), 100U);
@@ -299,7 +297,7 @@ TEST_F(HostileNames, UnitReportContainsNoHtmlTagsFromNames) {
     const std::string name = random_name(random) + "x";  // an empty fact has no row
     const std::string page = report(name);
     ASSERT_TRUE(is_utf8(page));
-    ASSERT_EQ(extract_tags(page), plain) << escape_text_for_single_line(name);
+    ASSERT_EQ(extract_tags(page), plain) << escape_for_line(name);
   }
 }
 
@@ -308,15 +306,14 @@ TEST_F(HostileNames, ExportSelectedRunsToFileWritesExactlyOneRowPerRun) {
   std::vector<RunRecord> runs;
   runs.reserve(kNames / every);
   for (int i = 0; i < kNames / every; ++i) runs.push_back(run_with(random_name(random), i));
-  export_runs_to_file(folder / "runs.json", runs);
+  write_runs(folder / "runs.json", runs);
   const auto json = nlohmann::json::parse(TemporaryFolder::read_content(folder / "runs.json"));
   ASSERT_EQ(json.size(), runs.size());
-  for (RunRecord& run : runs) run = escape_texts_of_run(std::move(run));  // as in records
-  export_runs_to_file(folder / "runs.csv", runs);
+  for (RunRecord& run : runs) run = escape_run(std::move(run));  // as in records
+  write_runs(folder / "runs.csv", runs);
   const CsvTable table(folder / "runs.csv");
   ASSERT_EQ(table.num_rows(), runs.size());
-  const auto verdict = table.get_required_column("verdict"),
-             name = table.get_required_column("run");
+  const auto verdict = table.require_column("verdict"), name = table.require_column("run");
   for (std::size_t row = 0; row < table.num_rows(); ++row) {
     ASSERT_EQ(table.get_cell_text(row, verdict), "FAIL");
     ASSERT_EQ(table.get_cell_text(row, name), runs[row].run);
@@ -329,9 +326,9 @@ TEST_F(HostileNames, ReadCalibrationReturnsWrittenCameraId) {
   Calibration calibration = read_calibration(example);
   constexpr int every = 50;
   for (int i = 0; i < kNames / every; ++i) {
-    const std::string name = "a" + escape_text_for_single_line(random_name(random));
+    const std::string name = "a" + escape_for_line(random_name(random));
     calibration.camera.id = name;
-    const auto file = folder.file("calibration.yaml", format_calibration_yaml(calibration));
+    const auto file = folder.file("calibration.yaml", format_calibration(calibration));
     const Calibration read = read_calibration(file);
     ASSERT_EQ(read.camera.id, name);
     ASSERT_EQ(read.camera.intrinsics, calibration.camera.intrinsics);
@@ -347,7 +344,7 @@ TEST_F(HostileNames, RecordsListExactlyTheStoredRuns) {
       records.store_run(run_with(random_name(random), i));
     }
     EXPECT_EQ(records.list_run_summaries({}).size(), std::size_t{kNames / every});
-    EXPECT_THAT(records.check_records_by_audit_trail("").problems, testing::IsEmpty());
+    EXPECT_THAT(records.check_trail("").problems, testing::IsEmpty());
   }
   const auto listed = run_program("vlp-station list --records " + where);
   ASSERT_EQ(listed.exit_code, 0) << listed.errors;

@@ -112,7 +112,7 @@ class HostileStation : public SmallStation {
   /// Stores a run in the outbox with another document.
   void spool(const RunRecord& run, const std::string& document) const {
     Records((home / "spool/outbox.db").string())
-        .store_run(run, derive_database_identity((home / "records.db").string()));
+        .store_run(run, derive_identity((home / "records.db").string()));
     write("document", document);
     python(
         "import os, sqlite3, sys\n"

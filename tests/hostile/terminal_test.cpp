@@ -39,7 +39,7 @@ bool wait_for_echo(bool is_wanted) {
   std::signal(SIGTTOU, SIG_DFL);
   Terminal terminal;
   constexpr int wait_ms = 10;
-  while (!was_interrupt_signal_received()) terminal.wait_for_key(wait_ms);
+  while (!was_interrupted()) terminal.wait_for_key(wait_ms);
   ::_exit(0);
 }
 

@@ -191,7 +191,7 @@ TEST(LightDetector, IdentifiesLampsByClassifierDespiteWrongMapFrequency) {
   }
   ASSERT_EQ(training.size(), 40U);
   *map.lamps[0].frequency_hz *= 1.05;
-  const LightDetector by_classifier(map, drawn_camera(size), fit_lamp_classifier(training));
+  const LightDetector by_classifier(map, drawn_camera(size), fit_classifier(training));
   const std::pair lamp(LightKind::lamp, LightReason::identified);
   EXPECT_EQ(list_kinds(by_classifier.detect_lights(to_image_view(draw(0.33)))),
             std::vector(4, lamp));

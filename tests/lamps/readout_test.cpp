@@ -17,10 +17,10 @@ cv::Mat sample(const std::string& scene) {
 }
 
 std::optional<Readout> found_in(const cv::Mat& image) {
-  return estimate_readout_direction(1, [&](std::size_t) { return to_image_view(image); });
+  return estimate_readout(1, [&](std::size_t) { return to_image_view(image); });
 }
 
-TEST(EstimateReadoutDirection, ReturnsTrueReadoutOfRenderedImages) {
+TEST(EstimateReadout, ReturnsTrueReadoutOfRenderedImages) {
   for (const char* scene : {"paper-rig", "paper-rig-faulty", "clutter"}) {
     EXPECT_EQ(found_in(sample(scene)), Readout::rows) << scene;
     EXPECT_EQ(found_in(sample(scene).t()), Readout::columns) << scene;
@@ -29,18 +29,18 @@ TEST(EstimateReadoutDirection, ReturnsTrueReadoutOfRenderedImages) {
   EXPECT_EQ(found_in(sample("wide").t()), Readout::rows);
 }
 
-TEST(EstimateReadoutDirection, ReturnsNulloptWithoutLamps) {
+TEST(EstimateReadout, ReturnsNulloptWithoutLamps) {
   EXPECT_FALSE(found_in(cv::Mat(120, 160, CV_8U, cv::Scalar(30))));
   EXPECT_FALSE(found_in({}));
-  EXPECT_FALSE(estimate_readout_direction(0, [](std::size_t) { return ImageView(); }));
+  EXPECT_FALSE(estimate_readout(0, [](std::size_t) { return ImageView(); }));
 }
 
-TEST(EstimateReadoutDirection, StopsReadingAfterFirstConclusiveImages) {
+TEST(EstimateReadout, StopsReadingAfterFirstConclusiveImages) {
   const cv::Mat lamps = sample("paper-rig"), dark(600, 800, CV_8U, cv::Scalar(2));
   const std::array images{cv::Mat(), dark, lamps, lamps, cv::Mat()};
   std::size_t asked = 0;
-  EXPECT_EQ(estimate_readout_direction(
-                images.size(), [&](std::size_t i) { return ++asked, to_image_view(images[i]); }),
+  EXPECT_EQ(estimate_readout(images.size(),
+                             [&](std::size_t i) { return ++asked, to_image_view(images[i]); }),
             Readout::rows);
   EXPECT_LE(asked, 4);
 }

@@ -63,11 +63,10 @@ template <typename ImageProcessing>
 Identified identified(const fs::path& data, const ImageProcessing& picture) {
   const LightDetector detector(read_lamp_map(data / "lamps.yaml"), {Readout::columns, 15.1e-6, {}});
   const CsvTable table(data / "expected.csv");
-  const auto image_column = table.get_required_column("image"),
-             lamp_column = table.get_required_column("lamp");
-  const auto u_column = table.get_required_column("u_px"),
-             v_column = table.get_required_column("v_px");
-  const auto size_column = table.get_required_column("size_px");
+  const auto image_column = table.require_column("image"),
+             lamp_column = table.require_column("lamp");
+  const auto u_column = table.require_column("u_px"), v_column = table.require_column("v_px");
+  const auto size_column = table.require_column("size_px");
   std::map<std::string, std::map<int, Light>> found;
   Identified result;
   for (std::size_t row = 0; row < table.num_rows(); ++row) {
@@ -124,8 +123,7 @@ TEST_F(LightDetectorOnRealDownlights, StripePeriodsYieldTrueRowTime) {
       if (are_stripes_reliable(light.stripes)) periods.push_back({light.stripes.period_lines, {}});
     }
   }
-  const RowTimeResult result =
-      select_row_time_candidate(estimate_row_time_candidates(periods, map()));
+  const RowTimeResult result = select_row_time(list_row_time_candidates(periods, map()));
   ASSERT_TRUE(result.row_time) << result.problem;
   EXPECT_NEAR(result.row_time->row_time_s / 15.10e-6, 1, 0.002);
 }
@@ -161,19 +159,17 @@ TEST(LightDetectorOnRealObliqueDownlights, LocatesRimsWithoutLens) {
 }
 
 /// Photographs with readout along rows and along columns, without a given readout direction.
-TEST(DetectLightsWithUnknownReadout, ReturnsReadoutAndAllLampsOfRealGlows) {
+TEST(DetectBothReadouts, ReturnsReadoutAndAllLampsOfRealGlows) {
   const fs::path data = real_data("luxapose");
   if (data.empty()) GTEST_SKIP() << "no real captures here";
   const LightDetector by_rows(read_lamp_map(data / "lamps.yaml"), {Readout::rows, 1 / 47540.0, {}});
-  for (const LightDetector& detector :
-       {by_rows, by_rows.copy_detector_with_readout_direction(Readout::columns)}) {
+  for (const LightDetector& detector : {by_rows, by_rows.copy_with_readout(Readout::columns)}) {
     for (const auto& [name, readout, count] :
          {std::tuple("x_0_y_1.27.jpg", Readout::rows, 5),
           std::tuple("2014-02-27--18-15-03-62.jpg", Readout::columns, 3),
           std::tuple("small_blob.jpg", Readout::rows, 5)}) {
       const cv::Mat image = read_image(data / name);
-      const LightsWithReadout found =
-          detect_lights_with_unknown_readout(detector, to_image_view(image));
+      const LightsWithReadout found = detect_both_readouts(detector, to_image_view(image));
       EXPECT_EQ(found.readout, readout) << name;
       EXPECT_EQ(std::count_if(found.lights.begin(), found.lights.end(),
                               [](const Light& light) { return light.kind == LightKind::lamp; }),

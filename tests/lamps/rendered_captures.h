@@ -47,24 +47,21 @@ class Captures {
   /// Error of a center above which, and above its sigma, a lamp counts as wrong.
   double max_error_px = 5;
 
-  LampShot shot(std::size_t index) const {
-    return make_lamp_capture_parameters(scene_, set_, index);
-  }
+  LampShot shot(std::size_t index) const { return make_lamp_shot(scene_, set_, index); }
   cv::Mat image(const LampShot& shot) const {
-    const cv::Mat lines =
-        simulate_sensor_image(scene_.sensor, renderer_.render_lamps_in_electrons(shot),
-                              shot.noise_seed, scene_.processing);
+    const cv::Mat lines = simulate_sensor_image(scene_.sensor, renderer_.render_lamps(shot),
+                                                shot.noise_seed, scene_.processing);
     const cv::Mat image = scene_.camera.readout == Readout::rows ? lines : cv::Mat(lines.t());
-    return cv::imdecode(encode_image_as_jpeg_or_png(image, scene_.processing),
+    return cv::imdecode(encode_image(image, scene_.processing),
                         cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH);
   }
   std::vector<TrueLamp> truth(const LampShot& shot) const {
-    return find_true_lamps_in_image(scene_, renderer_, shot);
+    return list_true_lamps(scene_, renderer_, shot);
   }
-  LampMap lamps() const { return make_scene_lamp_map(scene_, false); }
+  LampMap lamps() const { return make_lamp_map(scene_, false); }
   Calibration calibration() const { return make_true_calibration(scene_); }
   LightDetector detector() const { return {lamps(), make_detector_camera(calibration())}; }
-  std::size_t size() const { return count_captures_of_set(set_); }
+  std::size_t size() const { return count_shots(set_); }
 
   /// Evaluates every `step`-th capture for the lamps selected by `counts`; wrong identifications
   /// count for all lamps.
@@ -76,7 +73,7 @@ class Captures {
       std::size_t step, const LightDetector& lamp_detector,
       const std::function<bool(int)>& counts = [](int) { return true; }) const {
     Score score;
-    for (std::size_t i = 0; i < count_captures_of_set(set_); i += step) {
+    for (std::size_t i = 0; i < count_shots(set_); i += step) {
       const LampShot shot = this->shot(i);
       std::map<int, Light> found;
       for (Light& light : lamp_detector.detect_lights(to_image_view(image(shot)))) {

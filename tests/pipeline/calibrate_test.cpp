@@ -97,7 +97,7 @@ TEST_F(VlpCalibrate, Calibrates190DegreeLensWithinTenthOfPixel) {
     ASSERT_EQ(run.exit_code, 0) << run.errors;
     const Camera found = read_calibration(folder / "results/calibration.yaml").camera;
     const auto up_to = [&](double degrees) {
-      return compute_projection_difference(
+      return compare_projections(
           lens, Lens(found.lens_model, found.intrinsics), truth.imager_px, [&](const auto& pixel) {
             const auto ray = lens.unproject_pixel(pixel);
             const double least = std::cos(rad_from_deg(degrees));

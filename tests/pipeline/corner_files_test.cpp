@@ -57,7 +57,7 @@ TEST_F(VlpIntrinsicsCornerFiles, TablesYieldSameLensAsImagesAndAsSolveOfMrcal) {
   const Lens here = read_lens("camera.yaml");
   const std::array imager_px{800, 600};
   const auto one = [](const auto&) { return 1; };
-  EXPECT_LT(compute_projection_difference(lens, here, imager_px, one)->worst_px, 1e-3);
+  EXPECT_LT(compare_projections(lens, here, imager_px, one)->worst_px, 1e-3);
   EXPECT_EQ(read_calibration(folder / "camera.yaml").intrinsics_report->outliers, 0);
   const IntrinsicsReport report = *read_calibration(folder / "camera.yaml").intrinsics_report;
 
@@ -84,9 +84,9 @@ TEST_F(VlpIntrinsicsCornerFiles, TablesYieldSameLensAsImagesAndAsSolveOfMrcal) {
     break;
   }
   ASSERT_LT(theirs_px, right_px);
-  const Camera found = read_camera_of_any_format(folder / "mrcal/camera-0.cameramodel").camera;
+  const Camera found = read_any_camera(folder / "mrcal/camera-0.cameramodel").camera;
   const Lens theirs(found.lens_model, found.intrinsics);
-  EXPECT_LT(compute_projection_difference(theirs, here, imager_px, one)->worst_px, 0.01);
+  EXPECT_LT(compare_projections(theirs, here, imager_px, one)->worst_px, 0.01);
   // mrcal counts the corners that are not seen, too, and its regularization, a tenth of the squares
   // of corners that are known to 0.01 px.
   constexpr double points = 12 * 10;

@@ -186,7 +186,7 @@ TEST_F(VlpEvaluate, CompareOptionFailsForWorseHeightYawOrSdAndForLostRows) {
   expect_refused(make_fixes(0, 0.06, 0, 0.001), "baseline.csv: its errors are 60 times the rep");
   expect_refused(make_fixes(42, 0, 0, 0.001) + "0,too_few_lamps,,,,,,,,,1,\n",
                  "baseline.csv: none of its rows has a fix");
-  folder.file("baseline.csv.origin", "commit none\nsha256 " + compute_text_sha256(accepted) + "\n");
+  folder.file("baseline.csv.origin", "commit none\nsha256 " + hash_text(accepted) + "\n");
   EXPECT_EQ(compare(accepted, accepted).exit_code, 0);
   expect_refused(make_fixes(0, 0.001, 0, 0.001), "baseline.csv: was changed after it was accepted");
 }

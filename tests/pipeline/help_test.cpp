@@ -175,14 +175,14 @@ TEST(BashCompletion, CompletesChoicesCommandsAndFiles) {
 }
 
 /// An option that was renamed would be recorded.
-TEST(ListOptionsOmittedFromHistory, ReturnsOnlyExistingOptions) {
+TEST(ListOmittedOptions, ReturnsOnlyExistingOptions) {
   std::vector<std::string> options;
   for (const char* program : {"vlp-adjust", "vlp-convert", "vlp-dispersion", "vlp-evaluate",
                               "vlp-intrinsics", "vlp-rotation", "vlp-train"}) {
     const auto more = options_in(read_help(program).at(""));
     options.insert(options.end(), more.begin(), more.end());
   }
-  for (const std::string_view option : list_options_omitted_from_history()) {
+  for (const std::string_view option : list_omitted_options()) {
     EXPECT_THAT(options, testing::Contains(option));
   }
 }

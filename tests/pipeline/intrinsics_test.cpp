@@ -32,9 +32,9 @@ TEST_P(VlpIntrinsicsRenderedImages, YieldTrueLensAndIdenticalFilesForAnyThreadCo
   const Camera truth = read_calibration(rig + "/true_calibration.yaml").camera;
   const Calibration found = read_calibration(folder / "camera.yaml");
   const auto difference =
-      compute_projection_difference(Lens(truth.lens_model, truth.intrinsics),
-                                    Lens(found.camera.lens_model, found.camera.intrinsics),
-                                    truth.imager_px, [](const auto&) { return 1; });
+      compare_projections(Lens(truth.lens_model, truth.intrinsics),
+                          Lens(found.camera.lens_model, found.camera.intrinsics), truth.imager_px,
+                          [](const auto&) { return 1; });
   EXPECT_LT(difference->mean_px, 0.05);
   EXPECT_LT(difference->worst_px, 0.2);
   ASSERT_TRUE(found.intrinsics_report);
@@ -113,9 +113,9 @@ TEST_P(VlpIntrinsicsProcessedImages, YieldTrueLensDespiteToneCurveSharpeningOrSa
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   const Camera truth = read_calibration(rig + "/true_calibration.yaml").camera;
   const Camera found = read_calibration(folder / "camera.yaml").camera;
-  const auto difference = compute_projection_difference(
-      Lens(truth.lens_model, truth.intrinsics), Lens(found.lens_model, found.intrinsics),
-      truth.imager_px, [](const auto&) { return 1; });
+  const auto difference = compare_projections(Lens(truth.lens_model, truth.intrinsics),
+                                              Lens(found.lens_model, found.intrinsics),
+                                              truth.imager_px, [](const auto&) { return 1; });
   EXPECT_LT(difference->mean_px, GetParam().mean_px);
   EXPECT_LT(difference->worst_px, GetParam().worst_px);
   RecordProperty("mean_px", std::to_string(difference->mean_px));

@@ -52,9 +52,9 @@ TEST(VlpLimits, NamesLargestErrorSourceOfCalibration) {
   write_lamp_map(folder / "lamps.yaml", lamps);
   const Camera camera = synthetic_camera();
   const JointCovariance zenith{{}, {"zenith_x", "zenith_y"}, 4e-10 * Eigen::Matrix2d::Identity()};
-  write_calibration(folder / "calibration.yaml",
-                    add_rotation_center_to_calibration({camera, {}, {}, {}, {}},
-                                                       tilted_by(camera, 0.02, 1), zenith, {}));
+  write_calibration(
+      folder / "calibration.yaml",
+      add_rotation_center({camera, {}, {}, {}, {}}, tilted_by(camera, 0.02, 1), zenith, {}));
   const auto result =
       run_program("cd " + (folder / "").string() +
                   " && vlp-limits --lamps lamps.yaml --calibration calibration.yaml "

@@ -108,7 +108,7 @@ class MotionCapture : public testing::Test {
     const CsvTable truth(folder / "truth.csv");
     EXPECT_EQ(truth.num_rows(), errors.fixes);
     for (std::size_t row = 0; row < truth.num_rows(); ++row) {
-      EXPECT_GT(truth.get_cell_number(row, truth.get_required_column("z_m")), 1);
+      EXPECT_GT(truth.get_cell_number(row, truth.require_column("z_m")), 1);
     }
     return errors;
   }

@@ -41,7 +41,7 @@ class VlpEvaluateReport : public testing::Test {
     must("vlp-locate " + kExample + "detections.csv" + rig(kExample + "calibration.yaml") + " -o" +
          in("fixes.csv"));
     write_plot(folder / "camera.svg",
-               make_intrinsics_plot_drawing(
+               draw_intrinsics(
                    IntrinsicsPlot{"unit 7",
                                   {800, 600},
                                   {{{10, 20}, {0.1, 0.2}, false}, {{700, 500}, {-0.1, 0.1}, false}},
@@ -94,7 +94,7 @@ TEST_F(VlpEvaluateReport, IsByteIdenticalOnRepeatAndWrittenWhenGateFails) {
 std::string good_page() {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
   report.plots = {render_report_plot(
-      make_error_cdf_plot_drawing(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
+      draw_error_cdf(CdfPlot{"errors", {{"fixes", {0.001, 0.002}, 0.001, 0.002}}}))};
   return render_report_html(report);
 }
 

@@ -17,7 +17,7 @@ namespace {
 
 using nlohmann::json;
 
-class RunProgramForEachStdinLine : public testing::Test {
+class RunEachLine : public testing::Test {
  protected:
   ProgramResult run(const std::string& lines) const {
     std::ofstream(folder / "lines") << lines;
@@ -44,7 +44,7 @@ class RunProgramForEachStdinLine : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(RunProgramForEachStdinLine, RunsNextLineAfterKillingRunAtTimeLimit) {
+TEST_F(RunEachLine, RunsNextLineAfterKillingRunAtTimeLimit) {
   // Images of 200 million pixels, which take no room on the disk.
   const auto session = folder / "endless";
   std::filesystem::create_directories(session / "rotation");
@@ -66,7 +66,7 @@ TEST_F(RunProgramForEachStdinLine, RunsNextLineAfterKillingRunAtTimeLimit) {
   EXPECT_EQ(all[1].at("exit_code"), 2);
 }
 
-TEST_F(RunProgramForEachStdinLine, RejectsInvalidLine) {
+TEST_F(RunEachLine, RejectsInvalidLine) {
   for (const std::string bad :
        {"x", R"({"arguments": "a", "limit_s": 1})", R"({"arguments": ["a"], "limit_s": 0})",
         R"({"arguments": ["a"], "limit_s": 4294967297})"}) {

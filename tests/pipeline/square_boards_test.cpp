@@ -36,9 +36,9 @@ class VlpIntrinsicsSquareBoards : public VlpIntrinsics {
   double mean_error_px() const {
     const Camera truth = read_calibration(rig + "/true_calibration.yaml").camera;
     const Calibration found = read_calibration(folder / "camera.yaml");
-    return compute_projection_difference(Lens(truth.lens_model, truth.intrinsics),
-                                         Lens(found.camera.lens_model, found.camera.intrinsics),
-                                         truth.imager_px, [](const auto&) { return 1; })
+    return compare_projections(Lens(truth.lens_model, truth.intrinsics),
+                               Lens(found.camera.lens_model, found.camera.intrinsics),
+                               truth.imager_px, [](const auto&) { return 1; })
         ->mean_px;
   }
 

@@ -81,7 +81,7 @@ void VlpStationKilled::expect_all_there() const {
     for (const auto& image : run["images"]) {
       const auto file = folder / "station/captures" / ("b." + name) / std::string(image["step"]) /
                         std::string(image["image"]);
-      EXPECT_EQ(compute_file_sha256(file), image["sha256"].get<std::string>()) << file;
+      EXPECT_EQ(hash_file(file), image["sha256"].get<std::string>()) << file;
     }
     const auto results = folder / "station/results/b" / name;
     EXPECT_EQ(TemporaryFolder::read_content(results / "calibration.yaml"), calibration);

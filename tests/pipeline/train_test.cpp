@@ -64,8 +64,8 @@ TEST_F(VlpTrain, ClassifierIdentifiesAllLampsInVlpDetectAndVlpLocate) {
   for (std::size_t row = 0; row < found.num_rows(); ++row) {
     const auto matches = [&](std::size_t other) {
       return read_text(found, row, "image") == read_text(truth, other, "image") &&
-             found.get_cell_integer(row, found.get_required_column("lamp")) ==
-                 truth.get_cell_integer(other, truth.get_required_column("lamp")) &&
+             found.get_cell_integer(row, found.require_column("lamp")) ==
+                 truth.get_cell_integer(other, truth.require_column("lamp")) &&
              std::abs(read_number(found, row, "u_px") - read_number(truth, other, "u_px")) < 0.5;
     };
     int matching = 0;

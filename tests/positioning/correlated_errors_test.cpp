@@ -71,9 +71,9 @@ TEST_P(CommonErrorsOfFix, CommonCovarianceMatchesFiniteDifferencesOfFix) {
     LampMap map = rig.map;
     Calibration other = rig.calibration;
     if (parameter < 12) {
-      other = add_error_to_calibrated_intrinsics(other, by * Eigen::VectorXd::Unit(12, parameter));
+      other = add_intrinsics_error(other, by * Eigen::VectorXd::Unit(12, parameter));
     } else if (parameter < 14) {
-      other = add_error_to_calibrated_zenith(other, by * Eigen::Vector2d::Unit(parameter - 12));
+      other = add_zenith_error(other, by * Eigen::Vector2d::Unit(parameter - 12));
     } else if (parameter >= 16) {
       map.lamps[static_cast<std::size_t>(parameter - 16) / 3].position_m[(parameter - 16) % 3] +=
           by;
@@ -144,8 +144,8 @@ TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUnce
   const MatrixX covariance = *rig.calibration.intrinsics_report->covariance;
   const auto detections = seen_from(rig, 0.1);
   const auto fix_with = [&](Eigen::Index parameter, double by) {
-    const Calibration other = add_error_to_calibrated_intrinsics(
-        rig.calibration, by * Eigen::VectorXd::Unit(12, parameter));
+    const Calibration other =
+        add_intrinsics_error(rig.calibration, by * Eigen::VectorXd::Unit(12, parameter));
     return to_states(Positioner(rig.map, other).compute_position_fix(detections));
   };
   Eigen::MatrixXd by_parameters(kBodyStates, 12);
@@ -163,7 +163,7 @@ TEST_F(CommonErrorsTest, FixCovarianceMatchesFiniteDifferencesWhenOnlyLensIsUnce
 TEST_F(CommonErrorsTest, LensErrorsAreUnknownIfAppliedStepIsIndependentOfLens) {
   const auto stated = [&](Correction correction) {
     return CommonErrors(rig.map.lamps, rig.calibration, correction)
-        .is_error_source_known_or_absent(CommonErrorSource::lens);
+        .is_known_or_absent(CommonErrorSource::lens);
   };
   rig.calibrate_in_a_row();
   for (const Correction correction :
@@ -181,12 +181,12 @@ TEST_F(CommonErrorsTest, LensErrorsAreUnknownIfAppliedStepIsIndependentOfLens) {
 /// An offset whose own errors are unknown moves against the error of the zenith.
 TEST_F(CommonErrorsTest, DispersionOffsetWithUnknownErrorsCompensatesZenith) {
   rig.calibrate_in_a_row();
-  rig.calibration.covariance = remove_dispersion_from_calibration(rig.calibration).covariance;
+  rig.calibration.covariance = remove_dispersion(rig.calibration).covariance;
   const CommonErrors errors(rig.map.lamps, rig.calibration, Correction::all);
-  const MatrixX& joint = errors.joint_error_covariance();
+  const MatrixX& joint = errors.joint_covariance();
   ASSERT_EQ(joint.rows(), 16);
-  EXPECT_FALSE(errors.is_error_source_known_or_absent(CommonErrorSource::offset));
-  EXPECT_TRUE(errors.is_error_source_known_or_absent(CommonErrorSource::zenith));
+  EXPECT_FALSE(errors.is_known_or_absent(CommonErrorSource::offset));
+  EXPECT_TRUE(errors.is_known_or_absent(CommonErrorSource::zenith));
   EXPECT_GT(joint(12, 12), 0);
   EXPECT_EQ(joint.row(14), -joint.row(12));
   EXPECT_EQ(joint.col(15), -joint.col(13));
@@ -195,7 +195,7 @@ TEST_F(CommonErrorsTest, DispersionOffsetWithUnknownErrorsCompensatesZenith) {
 /// Lamps of the joint covariance without correlation have the same effect as those of the survey.
 TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByUncorrelatedLampsOfJointCovariance) {
   rig.calibrate_in_a_row();
-  rig.calibration = remove_dispersion_from_calibration(rig.calibration);
+  rig.calibration = remove_dispersion(rig.calibration);
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 0.002;
   const auto detections = seen_from(rig, 0.1);
   const Fix without = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
@@ -203,19 +203,19 @@ TEST_F(CommonErrorsTest, FixCovarianceIsUnchangedByUncorrelatedLampsOfJointCovar
   JointCovariance& joint = *rig.calibration.covariance;
   for (const Lamp& lamp : rig.map.lamps) {
     joint.lamps.push_back({lamp.id, lamp.position_m});
-    append_parameters(joint, list_lamp_parameter_names(lamp.id),
-                      MatrixX::Zero(3, joint.matrix.rows()), 4e-6 * Eigen::Matrix3d::Identity());
+    append_parameters(joint, list_lamp_parameters(lamp.id), MatrixX::Zero(3, joint.matrix.rows()),
+                      4e-6 * Eigen::Matrix3d::Identity());
   }
   const CommonErrors large(rig.map.lamps, rig.calibration, Correction::all);
-  EXPECT_EQ(small.joint_error_covariance().rows(), small.num_shared_errors());
-  EXPECT_EQ(large.joint_error_covariance().rows(),
+  EXPECT_EQ(small.joint_covariance().rows(), small.num_shared_errors());
+  EXPECT_EQ(large.joint_covariance().rows(),
             large.num_shared_errors() + 3 * std::ssize(rig.map.lamps));
   const Fix with = Positioner(rig.map, rig.calibration).compute_position_fix(detections);
   ASSERT_TRUE(with.has_succeeded() && without.has_succeeded());
   const double scale = with.pose_covariance().norm();
   EXPECT_THAT(without.pose_covariance(), IsNear(with.pose_covariance(), 1e-12 * scale));
-  EXPECT_TRUE(small.are_any_errors_known() &&
-              small.isolate_error_source(CommonErrorSource::lamps).are_any_errors_known());
+  EXPECT_TRUE(small.has_known_errors() &&
+              small.isolate_error_source(CommonErrorSource::lamps).has_known_errors());
 }
 
 /// The offset depends on a lamp of the adjustment, whose error is not in the survey.
@@ -227,7 +227,7 @@ TEST_F(CommonErrorsTest, DispersionOffsetIsCorrelatedWithAdjustedLamp) {
   append_parameters(joint, list_pair_names(kOffsetParameter), jacobian, Matrix2::Zero());
   rig.calibration.dispersion = {{0.4, -0.3}, 0.001, {0, 0}, 12};
   const CommonErrors errors(rig.map.lamps, rig.calibration, Correction::all);
-  const MatrixX& found = errors.joint_error_covariance();
+  const MatrixX& found = errors.joint_covariance();
   ASSERT_EQ(found.rows(), 12 + 2 + 2 + 24);
   EXPECT_EQ((found.block<2, 2>(14, 14)), (joint.matrix.block<2, 2>(40, 40)));
   EXPECT_EQ((found.block<2, 3>(14, 19)), (joint.matrix.block<2, 3>(40, 19)));

@@ -29,8 +29,8 @@ Eigen::Matrix4d compute_limit(const SyntheticRig& rig, double sigma_px) {
   std::vector<Eigen::Vector3d> lamps_m;
   for (const Lamp& lamp : rig.map.lamps) lamps_m.push_back(lamp.position_m);
   const Camera& camera = rig.calibration.camera;
-  const auto budget = compute_fix_error_budget(lamps_m, Lens(camera.lens_model, camera.intrinsics),
-                                               rig.camera, {sigma_px, 0, 0, 0});
+  const auto budget = compute_fix_budget(lamps_m, Lens(camera.lens_model, camera.intrinsics),
+                                         rig.camera, {sigma_px, 0, 0, 0});
   return budget.value().noise;
 }
 

@@ -21,7 +21,7 @@ std::vector<Eigen::Vector3d> get_lamp_positions(const LampMap& map) {
   return positions_m;
 }
 
-TEST(ComputeFixErrorBudget, NoiseTermMatchesFormulaForPinholeAndEqualHeights) {
+TEST(ComputeFixBudget, NoiseTermMatchesFormulaForPinholeAndEqualHeights) {
   const double focal_px = 520, sigma_px = 0.3;
   const Lens lens(LensModel::pinhole, std::array{focal_px, focal_px, 400.0, 300.0});
   for (const std::size_t n : {2u, 3u, 5u, 8u}) {
@@ -35,7 +35,7 @@ TEST(ComputeFixErrorBudget, NoiseTermMatchesFormulaForPinholeAndEqualHeights) {
     for (const auto& lamp_m : lamps_m) spread += (lamp_m - mean).squaredNorm();
     const double height_m = 1.6 - 0.25, unit_m = height_m / focal_px * sigma_px;
     const double d = (mean - pose.position_m).head<2>().norm();
-    const auto budget = compute_fix_error_budget(lamps_m, lens, pose, {sigma_px, 0, 0, 0});
+    const auto budget = compute_fix_budget(lamps_m, lens, pose, {sigma_px, 0, 0, 0});
     ASSERT_TRUE(budget);
     const double horizontal_m = unit_m * std::sqrt(1 / static_cast<double>(n) + d * d / spread);
     const Eigen::Vector4d expected(horizontal_m, horizontal_m,
@@ -45,13 +45,13 @@ TEST(ComputeFixErrorBudget, NoiseTermMatchesFormulaForPinholeAndEqualHeights) {
   }
 }
 
-TEST(ComputeFixErrorBudget, ReturnsNulloptWithoutTwoLampsInFrontOfLens) {
+TEST(ComputeFixBudget, ReturnsNulloptWithoutTwoLampsInFrontOfLens) {
   const Lens lens(LensModel::pinhole, std::array{520.0, 520.0, 400.0, 300.0});
   const ErrorSources noise{0.1, 0, 0, 0};
   const std::vector<Eigen::Vector3d> lamps_m{{0, 0, 2}, {1, 0, 2}};
-  EXPECT_FALSE(compute_fix_error_budget({lamps_m.data(), 1}, lens, {{0, 0, 0}, 0}, noise));
-  EXPECT_FALSE(compute_fix_error_budget(lamps_m, lens, {{0, 0, 2.5}, 0}, noise));
-  EXPECT_TRUE(compute_fix_error_budget(lamps_m, lens, {{0, 0, 0}, 0}, noise));
+  EXPECT_FALSE(compute_fix_budget({lamps_m.data(), 1}, lens, {{0, 0, 0}, 0}, noise));
+  EXPECT_FALSE(compute_fix_budget(lamps_m, lens, {{0, 0, 2.5}, 0}, noise));
+  EXPECT_TRUE(compute_fix_budget(lamps_m, lens, {{0, 0, 0}, 0}, noise));
 }
 
 /// Free states of a camera that is level and at rest: one or all.
@@ -84,9 +84,9 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<FreeStates> {
   }
   std::optional<ErrorBudget> budget(const BodyPrior& prior) const {
     const Camera& camera = rig.calibration.camera;
-    return compute_fix_error_budget(get_lamp_positions(rig.map),
-                                    Lens(camera.lens_model, camera.intrinsics), rig.body.pose,
-                                    sources, prior, make_readout_clock(camera));
+    return compute_fix_budget(get_lamp_positions(rig.map),
+                              Lens(camera.lens_model, camera.intrinsics), rig.body.pose, sources,
+                              prior, make_readout_clock(camera));
   }
   Eigen::Vector4d locate(const BodyRig& with, const std::vector<Detection>& detections) const {
     const Fix fix = with.positioner().compute_position_fix(detections, sensors());
@@ -189,8 +189,8 @@ TEST_F(ErrorBudgetPriorCases, EqualsBudgetOfStandingCameraWhenPriorIsTight) {
   const auto found = budget(prior);
   const Camera& camera = rig.calibration.camera;
   const auto standing =
-      compute_fix_error_budget(get_lamp_positions(rig.map),
-                               Lens(camera.lens_model, camera.intrinsics), rig.body.pose, sources);
+      compute_fix_budget(get_lamp_positions(rig.map), Lens(camera.lens_model, camera.intrinsics),
+                         rig.body.pose, sources);
   ASSERT_TRUE(found && standing);
   expect_close(found->noise, standing->noise, 1e-6);
   expect_close(found->total_pose_covariance(), standing->total_pose_covariance(), 1e-6);

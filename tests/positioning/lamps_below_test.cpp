@@ -147,7 +147,7 @@ class CameraAboveUncertainLamps : public CameraAboveLamps {
     JointCovariance& joint = rig.calibration.covariance.emplace();
     for (const Lamp& lamp : rig.map.lamps) {
       joint.lamps.push_back({lamp.id, lamp.position_m});
-      std::ranges::move(list_lamp_parameter_names(lamp.id), std::back_inserter(joint.parameters));
+      std::ranges::move(list_lamp_parameters(lamp.id), std::back_inserter(joint.parameters));
     }
     joint.matrix = covariance;
   }

@@ -27,23 +27,23 @@ Fix fix_with(double chi_squared, double common_chi_squared, double degrees_of_fr
   return fix;
 }
 
-TEST(SumSquaredResidualsOfFixes, IgnoresFailedFixesAndFixesWithoutRedundancy) {
+TEST(SumFixResiduals, IgnoresFailedFixesAndFixesWithoutRedundancy) {
   const std::vector<Fix> fixes{fix_with(12, 2, 8), Fix(), fix_with(5, 1, 0), fix_with(6, 0, 4)};
-  const ResidualSums sums = sum_squared_residuals_of_fixes(fixes);
+  const ResidualSums sums = sum_fix_residuals(fixes);
   EXPECT_EQ(sums.degrees_of_freedom, 12);
   EXPECT_EQ(sums.squares_px2, 2);
 }
 
-TEST(SumSquaredResidualsOfFixes, ExcludesFixAbove25TimesMedianChiSquaredRatio) {
+TEST(SumFixResiduals, ExcludesFixAbove25TimesMedianChiSquaredRatio) {
   // The median of 1, 1.25 and the third one's ratio is 1.25, and 25 times that is 31.25.
   for (const auto& [chi_squared, sum] : {std::pair(124.0, 12.0), {126.0, 8.0}, {3000.0, 8.0}}) {
     const std::vector<Fix> fixes{fix_with(5, 0, 4), fix_with(4, 0, 4), fix_with(chi_squared, 0, 4)};
-    EXPECT_EQ(sum_squared_residuals_of_fixes(fixes).degrees_of_freedom, sum);
+    EXPECT_EQ(sum_fix_residuals(fixes).degrees_of_freedom, sum);
   }
 }
 
 /// Mean of chi_squared over fixes of a rig whose lamps have random offsets from the map.
-class ComputeExpectedChiSquaredOfCommonErrors : public testing::Test {
+class ComputeExpectedChiSquared : public testing::Test {
  protected:
   void SetUp() override {
     rig.map = synthetic_lamps();
@@ -84,11 +84,9 @@ class ComputeExpectedChiSquaredOfCommonErrors : public testing::Test {
   Random random{5};
 };
 
-TEST_F(ComputeExpectedChiSquaredOfCommonErrors, MatchesMeanChiSquaredOfStandingCamera) {
-  expect_mean({});
-}
+TEST_F(ComputeExpectedChiSquared, MatchesMeanChiSquaredOfStandingCamera) { expect_mean({}); }
 
-TEST_F(ComputeExpectedChiSquaredOfCommonErrors, MatchesMeanChiSquaredWithEstimatedTilt) {
+TEST_F(ComputeExpectedChiSquared, MatchesMeanChiSquaredWithEstimatedTilt) {
   Sensors sensors;
   sensors.inclination_sigma_rad = 0.01;
   expect_mean(sensors);

@@ -50,7 +50,7 @@ struct StatedRig : SyntheticRig {
     std::vector<JointCovariance::LampPosition> lamps;
     for (const Lamp& lamp : map.lamps) lamps.push_back({lamp.id, lamp.position_m});
     calibration.adjustment = Adjustment{{}, 1, 1, 0.1};
-    calibration.covariance = make_adjusted_covariance(calibration.camera, lamps, covariance);
+    calibration.covariance = make_covariance(calibration.camera, lamps, covariance);
   }
 
   /// Sets the covariances of sequential steps, which depend on earlier ones, and a survey; `errors`

@@ -109,7 +109,7 @@ void expect_same(const vlp_fix& c, const Fix& fix) {
   EXPECT_EQ(c.rejected_lamps, fix.rejected_lamps);
   EXPECT_EQ(c.unknown_lamps, fix.unknown_lamps);
   EXPECT_TRUE(covariance.isApprox(covariance.transpose(), 1e-12));
-  EXPECT_GE(eigendecompose_symmetric_matrix(Eigen::MatrixXd(covariance)).values.minCoeff(), -1e-15);
+  EXPECT_GE(eigendecompose(Eigen::MatrixXd(covariance)).values.minCoeff(), -1e-15);
 }
 
 TEST_F(CInterface, VlpLocateEqualsCppFixForStandingCamera) {

@@ -27,11 +27,11 @@ std::pair<int, std::string> run_and_capture(const std::function<void()>& run) {
   char* argv[] = {name.data(), nullptr};
   CLI::App app("Something", name);
   testing::internal::CaptureStderr();
-  const int code = parse_arguments_and_run(app, 1, argv, run);
+  const int code = parse_and_run(app, 1, argv, run);
   return {code, testing::internal::GetCapturedStderr()};
 }
 
-TEST(ParseArgumentsAndRun, ReturnsExitCodeOfThrownException) {
+TEST(ParseAndRun, ReturnsExitCodeOfThrownException) {
   EXPECT_EQ(run_and_capture([] {}).first, kDone);
   EXPECT_EQ(run_and_capture([] { throw GateNotMet("mean_mm"); }).first, kGateNotMet);
   EXPECT_EQ(run_and_capture([] { throw InputError("lamps.yaml", "is empty"); }).first, kBadInput);
@@ -39,7 +39,7 @@ TEST(ParseArgumentsAndRun, ReturnsExitCodeOfThrownException) {
   EXPECT_EQ(run_and_capture([] { throw Undetermined("add lamps"); }).first, kUndetermined);
 }
 
-TEST(ParseArgumentsAndRun, PrintsErrorInOneLineWithoutControlCharacters) {
+TEST(ParseAndRun, PrintsErrorInOneLineWithoutControlCharacters) {
   const std::string said =
       run_and_capture([] { throw Undetermined("lamp \x1b[2J is dark"); }).second;
   EXPECT_THAT(said, HasSubstr("vlp-something: error: lamp "));
@@ -47,7 +47,7 @@ TEST(ParseArgumentsAndRun, PrintsErrorInOneLineWithoutControlCharacters) {
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1);
 }
 
-TEST(ParseArgumentsAndRun, NamesPathThatFileSystemRefuses) {
+TEST(ParseAndRun, NamesPathThatFileSystemRefuses) {
   const auto refused = std::make_error_code(std::errc::permission_denied);
   const auto [code, said] = run_and_capture(
       [&] { throw std::filesystem::filesystem_error("status", "check/captures.csv", refused); });
@@ -71,7 +71,7 @@ std::pair<int, std::string> end_with_full_stdout(const std::function<void()>& ru
   return end;
 }
 
-TEST(ParseArgumentsAndRun, ReturnsBadInputWhenStdoutCannotBeWritten) {
+TEST(ParseAndRun, ReturnsBadInputWhenStdoutCannotBeWritten) {
   for (const std::function<void()>& run : std::vector<std::function<void()>>{
            [] {}, [] { throw GateNotMet("mean_mm"); }, [] { throw Undetermined("add lamps"); }}) {
     const auto [code, said] = end_with_full_stdout(run);
@@ -80,39 +80,37 @@ TEST(ParseArgumentsAndRun, ReturnsBadInputWhenStdoutCannotBeWritten) {
   }
 }
 
-TEST(CheckOutputIsNotInput, RejectsOutputThatIsAlsoInput) {
+TEST(CheckOutputIsNoInput, RejectsOutputThatIsAlsoInput) {
   const TemporaryFolder folder;
   const std::string lamps = folder.file("lamps.yaml", "x").string();
   const std::string again = (folder / ".").string() + "/lamps.yaml";
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] {
-                check_output_is_not_input(again, {"", lamps});
+                check_output_is_no_input(again, {"", lamps});
               }),
               HasSubstr("is also an input"));
-  check_output_is_not_input((folder / "other.yaml").string(), {lamps});
+  check_output_is_no_input((folder / "other.yaml").string(), {lamps});
 }
 
-TEST(CheckOutputFilesAreDistinct, RejectsTwoOptionsWithSameFile) {
+TEST(CheckOutputsDistinct, RejectsTwoOptionsWithSameFile) {
   const TemporaryFolder folder;
   const std::string file = (folder / "a").string(), same = (folder / "b/../a").string();
-  check_output_files_are_distinct({{"--output", file}, {"--ros", ""}, {"--plot", ""}}, {});
-  EXPECT_EQ(
-      rejection_message<std::invalid_argument>([&] {
-        check_output_files_are_distinct({{"--output", file}, {"--ros", ""}, {"--plot", same}}, {});
-      }),
-      "--output and --plot are the same file; use another name");
+  check_outputs_distinct({{"--output", file}, {"--ros", ""}, {"--plot", ""}}, {});
+  EXPECT_EQ(rejection_message<std::invalid_argument>([&] {
+              check_outputs_distinct({{"--output", file}, {"--ros", ""}, {"--plot", same}}, {});
+            }),
+            "--output and --plot are the same file; use another name");
 }
 
 TEST(OptionValidators, RejectInvalidNumbersAndFileExtensions) {
   EXPECT_EQ(make_finite_validator()("-1e3"), "");
   EXPECT_NE(make_finite_validator()("inf"), "");
   EXPECT_NE(make_finite_validator()("1 m"), "");
-  EXPECT_EQ(make_finite_non_negative_validator()("0"), "");
-  EXPECT_NE(make_finite_positive_validator()("0"), "");
+  EXPECT_EQ(make_non_negative_validator()("0"), "");
+  EXPECT_NE(make_positive_validator()("0"), "");
   EXPECT_EQ(make_plot_file_validator()("a.svg"), "");
   EXPECT_NE(make_plot_file_validator()("a.pdf"), "");
-  EXPECT_EQ(make_file_extension_validator(".csv")("corners.csv"), "");
-  EXPECT_EQ(make_file_extension_validator(".csv")("corners.vnl"),
-            "the file's name should end in .csv");
+  EXPECT_EQ(make_extension_validator(".csv")("corners.csv"), "");
+  EXPECT_EQ(make_extension_validator(".csv")("corners.vnl"), "the file's name should end in .csv");
 }
 
 }  // namespace

@@ -31,9 +31,9 @@ Evaluation evaluation() {
   return evaluation;
 }
 
-TEST(FormatEvaluationStatistics, FormatsErrorsInMillimetersAndOmitsMissingIntervals) {
+TEST(ListStatistics, FormatsErrorsInMillimetersAndOmitsMissingIntervals) {
   EXPECT_THAT(
-      texts(format_evaluation_statistics(evaluation())),
+      texts(list_statistics(evaluation())),
       ElementsAre("captures | 10 |  | ", "without a fix | 2 |  | ",
                   "horizontal error, mean | 1 | mm | ", "horizontal error, median | 2 | mm | ",
                   "horizontal error, 90th percentile | 3 | mm | ",
@@ -41,11 +41,11 @@ TEST(FormatEvaluationStatistics, FormatsErrorsInMillimetersAndOmitsMissingInterv
                   "horizontal error, largest | 4 | mm | "));
 }
 
-TEST(FormatEvaluationStatistics, AddsIntervalToEachStatisticThatHasOne) {
+TEST(ListStatistics, AddsIntervalToEachStatisticThatHasOne) {
   Evaluation full = evaluation();
   full.intervals_m = {{0.001, 0.002}, {0.003, 0.004}, Interval{0.005, 0.006}, {0.007, 0.008}, 5};
   full.resampling_unit = "reference points";
-  const auto lines = texts(format_evaluation_statistics(full));
+  const auto lines = texts(list_statistics(full));
   EXPECT_THAT(lines, Contains("horizontal error, median | 2 | mm | 3 to 4"));
   EXPECT_THAT(lines, Contains("horizontal error, root mean square | 5 | mm | 7 to 8"));
   EXPECT_THAT(lines, Contains("horizontal error, 90th percentile | 3 | mm | 5 to 6"));
@@ -54,7 +54,7 @@ TEST(FormatEvaluationStatistics, AddsIntervalToEachStatisticThatHasOne) {
   EXPECT_THAT(make_evaluation_notes(full),
               Contains(HasSubstr("Caution: with only 5 reference points")));
   full.intervals_m->p90 = {};
-  EXPECT_THAT(texts(format_evaluation_statistics(full)),
+  EXPECT_THAT(texts(list_statistics(full)),
               Contains("horizontal error, 90th percentile | 3 | mm | "));
   full.comparison = Comparison{};
   EXPECT_THAT(
@@ -70,11 +70,11 @@ TEST(MakeEvaluationNotes, StatesReferenceMissingFixesAndMissingIntervals) {
                                  "Caution: there are too few captures with a fix for intervals."));
 }
 
-TEST(FormatLineDriveStatistics, LabelsBeginWithFileName) {
+TEST(ListDriveStatistics, LabelsBeginWithFileName) {
   LineFit fit{};
   fit.distances_m = {1001, 0.001, 0.002, 0.003, 0.004, 0.005};
   fit.jitter_m = 0.006;
-  EXPECT_THAT(texts(format_line_drive_statistics("a.csv", fit)),
+  EXPECT_THAT(texts(list_drive_statistics("a.csv", fit)),
               ElementsAre("a.csv: fitted line from the commanded one, mean | 1 | mm | ",
                           "a.csv: the same, 90th percentile | 3 | mm | ",
                           "a.csv: jitter across the fitted line, root mean square | 6 | mm | "));

@@ -20,15 +20,14 @@ EvaluationInput input() {
   return input;
 }
 
-TEST(MakePositionErrorPlots, ContainsFloorPlanAndDistributionForErrorsAgainstTruth) {
+TEST(MakeErrorPlots, ContainsFloorPlanAndDistributionForErrorsAgainstTruth) {
   EvaluationInput with_truth = input();
   with_truth.truth = {"truth.csv",
                       {{"a", {0, 0}, {}, {}, 2},
                        {"b", {0.5, 0}, {}, {}, 3},
                        {"c", {1, 0}, {}, {}, 4},
                        {"d", {0, 1}, {}, {}, 5}}};
-  const auto pictures =
-      make_position_error_plots(with_truth, evaluate_fix_accuracy(with_truth), {});
+  const auto pictures = make_error_plots(with_truth, evaluate_fixes(with_truth), {});
   ASSERT_EQ(pictures.size(), 2u);
   EXPECT_EQ(pictures[0].part, ReportPart::floor);
   EXPECT_THAT(pictures[0].drawing.value().commands, HasSubstr("no fix: 1"));
@@ -69,9 +68,9 @@ struct StatedRoom {
   }
 };
 
-TEST(MakeFixErrorBudgetPlot, StatesFractionOfVarianceForEachSource) {
+TEST(MakeBudgetPlot, StatesFractionOfVarianceForEachSource) {
   const StatedRoom room;
-  const auto picture = make_fix_error_budget_plot(room.fixes(), room.lamps, room.calibration);
+  const auto picture = make_budget_plot(room.fixes(), room.lamps, room.calibration);
   ASSERT_TRUE(picture);
   EXPECT_EQ(picture->part, ReportPart::distribution);
   // 0.18 of the 2 mm^2 are noise.
@@ -83,46 +82,46 @@ TEST(MakeFixErrorBudgetPlot, StatesFractionOfVarianceForEachSource) {
 
 /// The uncertainty of a fix with estimated roll and pitch cannot be divided like that of a level
 /// camera.
-TEST(MakeFixErrorBudgetPlot, OmitsFixesWithEstimatedRollPitch) {
+TEST(MakeBudgetPlot, OmitsFixesWithEstimatedRollPitch) {
   const StatedRoom room;
   auto fixes = room.fixes();
   fixes[1].fix->sd = Eigen::Vector4d(1e-2, 1e-2, 2e-2, 2e-3);
   fixes[1].fix->inclination = Inclination{0.1, 0};
-  const auto picture = make_fix_error_budget_plot(fixes, room.lamps, room.calibration);
+  const auto picture = make_budget_plot(fixes, room.lamps, room.calibration);
   ASSERT_TRUE(picture);
   EXPECT_THAT(picture->drawing.value().commands, HasSubstr("noise, 9 %"));
   EXPECT_THAT(picture->caption, HasSubstr("for a level camera"));
   fixes[0].fix->inclination = Inclination{0, 0};
-  EXPECT_FALSE(make_fix_error_budget_plot(fixes, room.lamps, room.calibration));
+  EXPECT_FALSE(make_budget_plot(fixes, room.lamps, room.calibration));
 }
 
-TEST(MakeFixErrorBudgetPlot, ReturnsNulloptWithoutMapNoiseSdsOrKnownCommonErrors) {
+TEST(MakeBudgetPlot, ReturnsNulloptWithoutMapNoiseSdsOrKnownCommonErrors) {
   StatedRoom room;
-  EXPECT_FALSE(make_fix_error_budget_plot(room.fixes(), {}, room.calibration));
+  EXPECT_FALSE(make_budget_plot(room.fixes(), {}, room.calibration));
   auto fixes = room.fixes();
   for (FixRow& row : fixes) row.fix->noise_sd.reset();
-  EXPECT_FALSE(make_fix_error_budget_plot(fixes, room.lamps, room.calibration));
+  EXPECT_FALSE(make_budget_plot(fixes, room.lamps, room.calibration));
   for (Lamp& lamp : room.lamps.lamps) lamp.sd_m.reset();
   room.calibration.covariance.reset();
-  EXPECT_FALSE(make_fix_error_budget_plot(room.fixes(), room.lamps, room.calibration));
+  EXPECT_FALSE(make_budget_plot(room.fixes(), room.lamps, room.calibration));
 }
 
 /// A rejected lamp does not contribute to the uncertainty of the fix.
-TEST(MakeFixErrorBudgetPlot, ExcludesErrorsOfLampsRejectedByFix) {
+TEST(MakeBudgetPlot, ExcludesErrorsOfLampsRejectedByFix) {
   StatedRoom room;
   room.lamps.lamps[0].sd_m = 0.1;
   auto fixes = room.fixes();
-  EXPECT_THAT(make_fix_error_budget_plot(fixes, room.lamps, room.calibration).value().alt,
+  EXPECT_THAT(make_budget_plot(fixes, room.lamps, room.calibration).value().alt,
               HasSubstr("zenith 0 %"));
   for (FixRow& row : fixes) row.rejected_lamps = {1};
-  EXPECT_THAT(make_fix_error_budget_plot(fixes, room.lamps, room.calibration).value().alt,
+  EXPECT_THAT(make_budget_plot(fixes, room.lamps, room.calibration).value().alt,
               testing::Not(HasSubstr("zenith 0 %")));
 }
 
-TEST(MakePositionErrorPlots, BeginsWithTrackPlotForCommandedLine) {
+TEST(MakeErrorPlots, BeginsWithTrackPlotForCommandedLine) {
   EvaluationInput with_line = input();
   with_line.line_m = {Eigen::Vector2d{0, 0}, Eigen::Vector2d{1, 0}};
-  const auto pictures = make_position_error_plots(with_line, evaluate_fix_accuracy(with_line), {});
+  const auto pictures = make_error_plots(with_line, evaluate_fixes(with_line), {});
   ASSERT_EQ(pictures.size(), 2u);
   EXPECT_EQ(pictures[0].part, ReportPart::tracks);
   EXPECT_THAT(pictures[0].caption, HasSubstr("Drive. Above"));

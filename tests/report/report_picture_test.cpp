@@ -19,11 +19,10 @@ using testing::Not;
 
 TEST(ReadReportPlot, AssignsReportPartByTitleOfOwnPlots) {
   const TemporaryFolder folder;
-  write_plot(folder / "a.svg",
-             make_rotation_plot_drawing(RotationPlot{"", {}, {203, 198}, {210, 190}}));
+  write_plot(folder / "a.svg", draw_rotation(RotationPlot{"", {}, {203, 198}, {210, 190}}));
   EXPECT_EQ(read_report_plot(folder / "a.svg").part, ReportPart::rotation);
-  write_plot(folder / "b.svg", make_dispersion_plot_drawing(DispersionPlot{
-                                   "", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}));
+  write_plot(folder / "b.svg",
+             draw_dispersion(DispersionPlot{"", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}));
   const ReportPlot picture = read_report_plot(folder / "b.svg");
   EXPECT_EQ(picture.part, ReportPart::dispersion);
   EXPECT_EQ(picture.image, TemporaryFolder::read_content(folder / "b.svg"));
@@ -54,26 +53,24 @@ std::string remove_empty_groups(const std::string& svg) {
 }
 
 /// Settings of one plot must not change the next one.
-TEST(RenderReportPlots, RendersSameImagesTogetherAsOneByOne) {
+TEST(RenderPlots, RendersSameImagesTogetherAsOneByOne) {
   ErrorPlot errors{"Errors", {}, {{0.3, 0.3}}, {}};
   errors.lamps.lamps = {{17, {0.4, 0.2, 2}, {}, {}, {}}};
   for (int i = 0; i < 5; ++i) errors.fixes.push_back({{0.1 * i, 0}, {0.1 * i, 0.002}, "a"});
   const std::vector<Drawing> drawings{
-      make_fix_error_plot_drawing(errors),
-      make_error_cdf_plot_drawing(
-          {"Distribution", {{"fixes", {0.001, 0.002, 0.004}, 0.002, 0.003}}}),
-      make_variance_budget_plot_drawing({"Budget", {"noise", "lens"}, {{1e-6, 2e-6}}}),
-      make_line_drive_plot_drawing({"Drive",
-                                    {{{0, 0}, {1, 0}}},
-                                    {{0, 0.001}, {0.5, 0.002}, {1, 0}},
-                                    {{{0, 0.001}, {1, 0.001}}}}),
-      make_dispersion_plot_drawing(
-          DispersionPlot{"Offset", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}),
-      make_fix_error_plot_drawing(errors)};
+      draw_fix_errors(errors),
+      draw_error_cdf({"Distribution", {{"fixes", {0.001, 0.002, 0.004}, 0.002, 0.003}}}),
+      draw_budget({"Budget", {"noise", "lens"}, {{1e-6, 2e-6}}}),
+      draw_line_drive({"Drive",
+                       {{{0, 0}, {1, 0}}},
+                       {{0, 0.001}, {0.5, 0.002}, {1, 0}},
+                       {{{0, 0.001}, {1, 0.001}}}}),
+      draw_dispersion(DispersionPlot{"Offset", {{{0.01, 0}}, {{0, 0}, 0.01}}, {{}, {}}, {}}),
+      draw_fix_errors(errors)};
   std::vector<ReportPlot> plots;
   for (const Drawing& drawing : drawings) plots.push_back(make_report_plot(drawing));
   plots.insert(plots.begin() + 1, {ReportPart::other, "image", "", ""});
-  render_report_plots(plots);
+  render_plots(plots);
   EXPECT_EQ(plots[1].image, "image");
   plots.erase(plots.begin() + 1);
   EXPECT_EQ(plots[1].part, ReportPart::distribution);

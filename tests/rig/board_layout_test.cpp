@@ -31,7 +31,7 @@ TEST(ListBoardTags, PlacesCharucoMarkersInWhiteSquares) {
   EXPECT_NEAR(markers[0].corners_m[1].y() - markers[0].corners_m[2].y(), 0.01, 1e-12);
   EXPECT_TRUE(is_square_black(board, 0, 0));
   EXPECT_EQ(compute_tag_field_size_m(board), Eigen::Vector2d(0.06, 0.04));
-  EXPECT_EQ(list_chessboard_corners_m(board).back(), Eigen::Vector2d(0.06, 0.04));
+  EXPECT_EQ(list_inner_corners_m(board).back(), Eigen::Vector2d(0.06, 0.04));
   board.top_left_white = true;
   EXPECT_NEAR(list_board_tags(board)[0].corners_m[3].x(), -0.015, 1e-12);
 }

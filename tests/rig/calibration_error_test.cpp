@@ -21,9 +21,8 @@ Calibration leaning() {
   return calibration;
 }
 
-TEST(AddErrorToCalibratedIntrinsics, ChangesIntrinsicsAndRotationCenterPixelButNotZenith) {
-  const Calibration moved =
-      add_error_to_calibrated_intrinsics(leaning(), Eigen::Vector4d(10, -5, 1, 2));
+TEST(AddIntrinsicsError, ChangesIntrinsicsAndRotationCenterPixelButNotZenith) {
+  const Calibration moved = add_intrinsics_error(leaning(), Eigen::Vector4d(10, -5, 1, 2));
   EXPECT_EQ(moved.camera.intrinsics, (std::vector<double>{510, 505, 401, 302}));
   ASSERT_TRUE(moved.rotation_center);
   EXPECT_EQ(moved.rotation_center->zenith_in_camera, leaning().rotation_center->zenith_in_camera);
@@ -31,22 +30,21 @@ TEST(AddErrorToCalibratedIntrinsics, ChangesIntrinsicsAndRotationCenterPixelButN
               IsNear(Eigen::Vector2d(401 + 0.02 * 510, 302 - 0.01 * 505), 1e-9));
   Calibration alone = leaning();
   alone.rotation_center.reset();
-  EXPECT_FALSE(
-      add_error_to_calibrated_intrinsics(alone, Eigen::Vector4d(1, 0, 0, 0)).rotation_center);
+  EXPECT_FALSE(add_intrinsics_error(alone, Eigen::Vector4d(1, 0, 0, 0)).rotation_center);
 }
 
-TEST(AddErrorToCalibratedZenith, AddsErrorToNormalizedZenithPointAndMovesCenterPixel) {
-  const Calibration moved = add_error_to_calibrated_zenith(leaning(), {0.001, 0.002});
+TEST(AddZenithError, AddsErrorToNormalizedZenithPointAndMovesCenterPixel) {
+  const Calibration moved = add_zenith_error(leaning(), {0.001, 0.002});
   ASSERT_TRUE(moved.rotation_center);
-  EXPECT_THAT(compute_normalized_zenith_point(*moved.rotation_center),
+  EXPECT_THAT(compute_zenith_point(*moved.rotation_center),
               IsNear(Eigen::Vector2d(0.021, -0.008), 1e-15));
   EXPECT_NEAR(moved.rotation_center->zenith_in_camera.norm(), 1, 1e-15);
   EXPECT_THAT(moved.rotation_center->center_px,
               IsNear(Eigen::Vector2d(400 + 0.021 * 500, 300 - 0.008 * 510), 1e-9));
 }
 
-TEST(AddErrorToCalibratedDispersionOffset, AddsErrorTimesFocalLengthToDispersionOffset) {
-  const Calibration moved = add_error_to_calibrated_dispersion_offset(leaning(), {0.001, -0.002});
+TEST(AddOffsetError, AddsErrorTimesFocalLengthToDispersionOffset) {
+  const Calibration moved = add_offset_error(leaning(), {0.001, -0.002});
   ASSERT_TRUE(moved.dispersion && moved.rotation_center);
   EXPECT_THAT(moved.dispersion->offset_px, IsNear(Eigen::Vector2d(1, -1.22), 1e-12));
   EXPECT_EQ(moved.rotation_center->center_px, leaning().rotation_center->center_px);
@@ -102,17 +100,17 @@ TEST(FindParameterCovariance, ReturnsNulloptForUnknownParameterAndWithoutKnownLe
   EXPECT_FALSE(find_parameter_covariance(calibration, kZenithParameter));
 }
 
-TEST(ComputeRotationCenterCovariance, CancelsErrorOfPrincipalPointThatZenithCompensates) {
+TEST(ComputeCenterCovariance, CancelsErrorOfPrincipalPointThatZenithCompensates) {
   Eigen::MatrixXd matrix;
-  const auto covariance = compute_rotation_center_covariance(leaning_with_covariance(matrix));
+  const auto covariance = compute_center_covariance(leaning_with_covariance(matrix));
   ASSERT_TRUE(covariance);
   const Matrix2 expected{{2.5e-3 + 0.02 * 0.02 * 0.04, 0}, {0, 2.601e-3 + 1e-4 * 0.05}};
   EXPECT_THAT(*covariance, IsNear(expected, 1e-12));
 }
 
-TEST(ComputeDispersionOffsetCovariance, ScalesByFocalLengths) {
+TEST(ComputeOffsetCovariance, ScalesByFocalLengths) {
   Eigen::MatrixXd matrix;
-  const auto covariance = compute_dispersion_offset_covariance(leaning_with_covariance(matrix));
+  const auto covariance = compute_offset_covariance(leaning_with_covariance(matrix));
   ASSERT_TRUE(covariance);
   EXPECT_THAT(*covariance, IsNear(Matrix2{{0.25, 0}, {0, 0.2601}}, 1e-12));
 }

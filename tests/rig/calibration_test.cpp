@@ -40,7 +40,7 @@ TEST(WriteCalibration, WritesExpectedYamlByteForByte) {
   const TemporaryFolder folder;
   write_calibration(folder / "calibration.yaml", sample_calibration());
   EXPECT_EQ(folder.read_content(folder / "calibration.yaml"), kCalibrationYaml);
-  EXPECT_EQ(format_calibration_yaml(sample_calibration()), kCalibrationYaml);
+  EXPECT_EQ(format_calibration(sample_calibration()), kCalibrationYaml);
 }
 
 TEST(ReadCalibration, AcceptsPartsInAnyOrder) {
@@ -68,7 +68,7 @@ Calibration calibration_with_joint_covariance() {
   append(list_pair_names(kZenithParameter));
   append(list_pair_names(kLeverArmParameter));
   joint.lamps = {{3, {1, 2, 3}}, {7, {-1, 0, 3}}};
-  for (const auto& lamp : joint.lamps) append(list_lamp_parameter_names(lamp.id));
+  for (const auto& lamp : joint.lamps) append(list_lamp_parameters(lamp.id));
   append(list_pair_names(kOffsetParameter));
   calibration.covariance = joint;
   calibration.adjustment = Adjustment{{"rotation", "survey"}, 12, 70, 0.05};
@@ -182,7 +182,7 @@ TEST(WriteCalibration, RoundTripsParametersOfEachLensModel) {
                                           {LensModel::opencv8, 12},
                                           {LensModel::opencv12, 16},
                                           {LensModel::fisheye, 8},
-                                          {lens_model_for_spline_grid({3, 4, 5, 90}), 44}}) {
+                                          {splined_lens_model({3, 4, 5, 90}), 44}}) {
     Calibration calibration = bare_calibration();
     calibration.camera.lens_model = model;
     for (int i = 4; i < parameters; ++i) calibration.camera.intrinsics.push_back(i * -1e-3);
@@ -192,7 +192,7 @@ TEST(WriteCalibration, RoundTripsParametersOfEachLensModel) {
 
 TEST(WriteCalibration, RoundTripsCovarianceOfSplinedLensCore) {
   Calibration calibration = sample_calibration();
-  calibration.camera.lens_model = lens_model_for_spline_grid({2, 3, 3, 120});
+  calibration.camera.lens_model = splined_lens_model({2, 3, 3, 120});
   calibration.camera.intrinsics.resize(num_lens_parameters(calibration.camera.lens_model), 0.25);
   const Eigen::MatrixXd root = Eigen::MatrixXd::Random(4, 4);
   const Eigen::MatrixXd covariance = 0.01 * root * root.transpose();

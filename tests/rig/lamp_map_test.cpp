@@ -43,12 +43,12 @@ TEST(ReadLampMap, RoundTripsLampsBelowCamera) {
               HasSubstr("lamps.yaml:2: lamps_below_camera: should be true or false"));
 }
 
-TEST(ReadOverheadLampsOfRoom, RejectsLampsBelowCamera) {
+TEST(ReadOverheadLamps, RejectsLampsBelowCamera) {
   const TemporaryFolder folder;
   const auto file = folder.file("lamps.yaml", kLampsYaml);
-  expect_same(read_overhead_lamps_of_room(file, ""), sample_lamps());
+  expect_same(read_overhead_lamps(file, ""), sample_lamps());
   folder.file("lamps.yaml", changed(kLampsYaml, "lamps:", "lamps_below_camera: true\nlamps:"));
-  EXPECT_THAT(rejection_message([&] { read_overhead_lamps_of_room(file, ""); }),
+  EXPECT_THAT(rejection_message([&] { read_overhead_lamps(file, ""); }),
               HasSubstr("lamps.yaml: lamps_below_camera: only vlp-detect and vlp-locate"));
 }
 
@@ -77,9 +77,8 @@ lamps:
   ASSERT_EQ(hall.lamps.size(), 1U);
   EXPECT_EQ(hall.lamps[0].id, 1);
   EXPECT_EQ(read_lamp_map(file).lamps.size(), 2U);
-  EXPECT_EQ(read_lamps_and_room_names(file, "").rooms,
-            (std::vector<std::string>{"hall", "office"}));
-  EXPECT_EQ(read_lamps_and_room_names(file, "office").rooms, std::vector<std::string>{"office"});
+  EXPECT_EQ(read_lamps_and_rooms(file, "").rooms, (std::vector<std::string>{"hall", "office"}));
+  EXPECT_EQ(read_lamps_and_rooms(file, "office").rooms, std::vector<std::string>{"office"});
   EXPECT_THAT(rejection_message([&] { read_lamps_of_room(file, "attic"); }),
               HasSubstr("has no lamp with 'room: attic'"));
 }

@@ -16,20 +16,20 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
 
-TEST(ReplaceDuplicateSetNamesByPaths, UsesPathsForEqualNames) {
+TEST(MakeSetNamesUnique, UsesPathsForEqualNames) {
   std::vector<AdjustSet> sets{{"check", {}, {}}, {"rotation", {}, {}}, {"check", {}, {}}};
-  replace_duplicate_set_names_by_paths(sets, {"a/check", "a/rotation", "b/check"});
+  make_set_names_unique(sets, {"a/check", "a/rotation", "b/check"});
   EXPECT_EQ(sets[0].name, "a/check");
   EXPECT_EQ(sets[1].name, "rotation");
   EXPECT_EQ(sets[2].name, "b/check");
   EXPECT_THAT(rejection_message<std::invalid_argument>([&] {
-                replace_duplicate_set_names_by_paths(sets, {"a/check", "a/rotation", "a/check"});
+                make_set_names_unique(sets, {"a/check", "a/rotation", "a/check"});
               }),
               testing::StartsWith("a/check is named twice"));
 }
 
 /// Two rotations in place, each a set whose captures name the pivot "1".
-class RunJointAdjustmentStep : public testing::Test {
+class RunAdjustStep : public testing::Test {
  protected:
   AdjustStepInput make_input(const char* pivot) {
     Survey survey;
@@ -52,8 +52,8 @@ class RunJointAdjustmentStep : public testing::Test {
   Eigen::Vector2d lever_arm_m;
 };
 
-TEST_F(RunJointAdjustmentStep, PivotsOfSetsAreDifferent) {
-  const AdjustStepResult result = run_joint_adjustment_step(make_input("1"), {});
+TEST_F(RunAdjustStep, PivotsOfSetsAreDifferent) {
+  const AdjustStepResult result = run_adjust_step(make_input("1"), {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   const auto metric_mm = find_metric_value(result.metrics, "lever_arm_mm");
   ASSERT_TRUE(metric_mm);
@@ -61,17 +61,17 @@ TEST_F(RunJointAdjustmentStep, PivotsOfSetsAreDifferent) {
   EXPECT_NEAR(*metric_mm, mm_per_m * lever_arm_m.norm(), 0.01);
 }
 
-TEST_F(RunJointAdjustmentStep, HasNoLeverArmWithoutPivots) {
-  const AdjustStepResult result = run_joint_adjustment_step(make_input(""), {});
+TEST_F(RunAdjustStep, HasNoLeverArmWithoutPivots) {
+  const AdjustStepResult result = run_adjust_step(make_input(""), {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_TRUE(find_metric_value(result.metrics, "tilt_deg"));
   EXPECT_FALSE(find_metric_value(result.metrics, "lever_arm_mm"));
 }
 
-TEST_F(RunJointAdjustmentStep, CapturesOfInPlaceRotationShareOnePivot) {
+TEST_F(RunAdjustStep, CapturesOfInPlaceRotationShareOnePivot) {
   AdjustStepInput input = make_input("");
   for (AdjustSet& set : input.sets) set.is_in_place_rotation = true;
-  const AdjustStepResult result = run_joint_adjustment_step(input, {});
+  const AdjustStepResult result = run_adjust_step(input, {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_THAT(result.warnings, IsEmpty());
   const auto metric_mm = find_metric_value(result.metrics, "lever_arm_mm");
@@ -96,54 +96,51 @@ AdjustStepInput set_known_positions(AdjustStepInput input, MeasuredPoint measure
   return input;
 }
 
-TEST_F(RunJointAdjustmentStep, WarnsOfPositionThatContradictsCaptures) {
+TEST_F(RunAdjustStep, WarnsOfPositionThatContradictsCaptures) {
   const AdjustStepInput input = make_input("1");
-  EXPECT_THAT(
-      run_joint_adjustment_step(set_known_positions(input, MeasuredPoint::axis, 0), {}).warnings,
-      IsEmpty());
-  const auto axis =
-      run_joint_adjustment_step(set_known_positions(input, MeasuredPoint::axis, 0.05), {});
+  EXPECT_THAT(run_adjust_step(set_known_positions(input, MeasuredPoint::axis, 0), {}).warnings,
+              IsEmpty());
+  const auto axis = run_adjust_step(set_known_positions(input, MeasuredPoint::axis, 0.05), {});
   ASSERT_TRUE(axis.has_succeeded()) << axis.message;
   EXPECT_THAT(axis.warnings,
               Contains("set 1/first: the position has an error of 50.0 mm and is ignored"));
-  const auto camera =
-      run_joint_adjustment_step(set_known_positions(input, MeasuredPoint::camera, 0.05), {});
+  const auto camera = run_adjust_step(set_known_positions(input, MeasuredPoint::camera, 0.05), {});
   ASSERT_TRUE(camera.has_succeeded()) << camera.message;
   EXPECT_THAT(camera.warnings,
               Contains(HasSubstr("mm and is ignored: is it that of the camera, and not of the "
                                  "rotation axis (reference_point: axis)?")));
 }
 
-TEST_F(RunJointAdjustmentStep, UsesPositionSdOfTableElseOfOption) {
+TEST_F(RunAdjustStep, UsesPositionSdOfTableElseOfOption) {
   AdjustStepInput input = set_known_positions(make_input("1"), MeasuredPoint::axis, 0);
   for (auto& [image, capture] : input.sets[1].captures) capture.position_sd_m.reset();
-  EXPECT_THAT(run_joint_adjustment_step(input, {}).warnings,
+  EXPECT_THAT(run_adjust_step(input, {}).warnings,
               Contains(HasSubstr("set 1: the positions of 12 captures are ignored")));
   input.position_sd_m = 1e-4;
-  const AdjustStepResult result = run_joint_adjustment_step(input, {});
+  const AdjustStepResult result = run_adjust_step(input, {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_THAT(result.warnings, IsEmpty());
   ASSERT_FALSE(result.adjustment.known_positions.empty());
   EXPECT_LT(result.adjustment.known_positions[0].residual_m.norm(), 1e-3);
   input.position_sd_m = 0;
-  EXPECT_THAT(rejection_message([&] { run_joint_adjustment_step(input, {}); }),
+  EXPECT_THAT(rejection_message([&] { run_adjust_step(input, {}); }),
               HasSubstr("set 1: position_sd_m is 0"));
 }
 
-TEST_F(RunJointAdjustmentStep, UsesMapSdOnlyForLampsWithoutSd) {
+TEST_F(RunAdjustStep, UsesMapSdOnlyForLampsWithoutSd) {
   AdjustStepInput input = make_input("1");
   input.lamps.lamps[2].sd_m.reset();
-  const AdjustStepResult result = run_joint_adjustment_step(input, {});
+  const AdjustStepResult result = run_adjust_step(input, {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   input.map_sd_m.reset();
-  EXPECT_THAT(rejection_message([&] { run_joint_adjustment_step(input, {}); }),
+  EXPECT_THAT(rejection_message([&] { run_adjust_step(input, {}); }),
               HasSubstr("lamps.yaml: lamp 3 has no sd_m"));
 }
 
-TEST_F(RunJointAdjustmentStep, StoresSetsLampsAndCovarianceOfSelectedMap) {
+TEST_F(RunAdjustStep, StoresSetsLampsAndCovarianceOfSelectedMap) {
   AdjustStepInput input = make_input("1");
   input.sets[1].frames.pop_back();
-  const AdjustStepResult surveyed = run_joint_adjustment_step(input, {"", "test", "1.2", "", {}});
+  const AdjustStepResult surveyed = run_adjust_step(input, {"", "test", "1.2", "", {}});
   ASSERT_TRUE(surveyed.has_succeeded() && surveyed.calibration.adjustment) << surveyed.message;
   const Adjustment& kept = *surveyed.calibration.adjustment;
   EXPECT_THAT(kept.sets, testing::ElementsAre("set 0", "set 1"));
@@ -159,7 +156,7 @@ TEST_F(RunJointAdjustmentStep, StoresSetsLampsAndCovarianceOfSelectedMap) {
   EXPECT_EQ(surveyed.calibration.history.back().part, "adjustment");
   input.lamps.lamps[3].position_m.x() += 0.003;
   input.refine_map = true;
-  const AdjustStepResult refined = run_joint_adjustment_step(input, {});
+  const AdjustStepResult refined = run_adjust_step(input, {});
   ASSERT_TRUE(refined.has_succeeded() && refined.calibration.adjustment) << refined.message;
   ASSERT_TRUE(refined.calibration.covariance);
   EXPECT_EQ(refined.calibration.covariance->matrix,
@@ -169,12 +166,12 @@ TEST_F(RunJointAdjustmentStep, StoresSetsLampsAndCovarianceOfSelectedMap) {
             refined.adjustment.refined_map.lamps[3].position_m);
   EXPECT_THAT(rejection_message([&] {
                 input.calibration = surveyed.calibration;
-                run_joint_adjustment_step(input, {});
+                run_adjust_step(input, {});
               }),
               HasSubstr("camera.yaml: is adjusted already"));
 }
 
-TEST_F(RunJointAdjustmentStep, WarnsOfResidualsAboveStatedNoise) {
+TEST_F(RunAdjustStep, WarnsOfResidualsAboveStatedNoise) {
   AdjustStepInput input = make_input("1");
   Random random(3);
   for (AdjustSet& set : input.sets) {
@@ -183,17 +180,17 @@ TEST_F(RunJointAdjustmentStep, WarnsOfResidualsAboveStatedNoise) {
       for (Detection& detection : frame.detections) *detection.sigma_px /= 2;
     }
   }
-  const AdjustStepResult result = run_joint_adjustment_step(input, {});
+  const AdjustStepResult result = run_adjust_step(input, {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_NEAR(result.adjustment.noise_scale, 2, 0.2);
   EXPECT_THAT(result.warnings, Contains(HasSubstr("times those expected from sigma_px")));
 }
 
-TEST_F(RunJointAdjustmentStep, WarnsOfLensThatContradictsCaptures) {
+TEST_F(RunAdjustStep, WarnsOfLensThatContradictsCaptures) {
   AdjustStepInput input = make_input("1");
   input.lens_sd_px = 0.05;
   const auto warning = HasSubstr("the captures contradict the lens: its correction has a");
-  const AdjustStepResult right = run_joint_adjustment_step(input, {});
+  const AdjustStepResult right = run_adjust_step(input, {});
   ASSERT_TRUE(right.has_succeeded()) << right.message;
   EXPECT_THAT(right.warnings, Not(Contains(warning)));
   ASSERT_TRUE(right.calibration.covariance);
@@ -209,13 +206,13 @@ TEST_F(RunJointAdjustmentStep, WarnsOfLensThatContradictsCaptures) {
       }
     }
   }
-  const AdjustStepResult wrong = run_joint_adjustment_step(input, {});
+  const AdjustStepResult wrong = run_adjust_step(input, {});
   ASSERT_TRUE(wrong.has_succeeded()) << wrong.message;
   EXPECT_THAT(wrong.warnings, Contains(warning));
   EXPECT_THAT(rejection_message([&] {
                 input.calibration.intrinsics_report.emplace().covariance =
                     lens_covariance(input.calibration.camera, 0.1, 8);
-                run_joint_adjustment_step(input, {});
+                run_adjust_step(input, {});
               }),
               HasSubstr("camera.yaml: has a lens covariance already"));
 }
@@ -234,18 +231,18 @@ TEST(RunJointAdjustmentStepOfDrive, FindsNoMovedLampInExactCapturesOfMovingCamer
     set.captures[image].velocity_m_per_s = Eigen::Vector2d(1, 0);
   }
   input.sets.push_back(set);
-  const AdjustStepResult result = run_joint_adjustment_step(input, {});
+  const AdjustStepResult result = run_adjust_step(input, {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_THAT(result.warnings, IsEmpty());
   EXPECT_NEAR(result.adjustment.residual_px, 0, 1e-3);
 }
 
-TEST_F(RunJointAdjustmentStep, RequiresRowTimeOnlyForMovingCamera) {
+TEST_F(RunAdjustStep, RequiresRowTimeOnlyForMovingCamera) {
   AdjustStepInput input = make_input("1");
   input.calibration.camera.row_time_s.reset();
-  EXPECT_NO_THROW(run_joint_adjustment_step(input, {}));
+  EXPECT_NO_THROW(run_adjust_step(input, {}));
   input.sets[0].captures[input.sets[0].frames[0].image].velocity_m_per_s = Eigen::Vector2d(1, 0);
-  EXPECT_THROW(run_joint_adjustment_step(input, {}), std::invalid_argument);
+  EXPECT_THROW(run_adjust_step(input, {}), std::invalid_argument);
 }
 
 }  // namespace

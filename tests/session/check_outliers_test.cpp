@@ -20,28 +20,26 @@ std::vector<CaptureError> errors_with(const std::vector<std::size_t>& indices) {
   return errors;
 }
 
-TEST(DescribePositionErrorOutliers, NamesConsecutiveCapturesAsRanges) {
-  EXPECT_EQ(describe_position_error_outliers(errors_with({0, 1, 2, 3, 4})),
+TEST(DescribeErrorOutliers, NamesConsecutiveCapturesAsRanges) {
+  EXPECT_EQ(describe_error_outliers(errors_with({0, 1, 2, 3, 4})),
             "captures 100 to 104 have errors up to 52.0 mm, the others 0.05 mm: taken at other "
             "positions than those in their table, or by another camera");
-  EXPECT_EQ(describe_position_error_outliers(errors_with({7})),
+  EXPECT_EQ(describe_error_outliers(errors_with({7})),
             "107 was not taken at the position in its table: its error is 52.0 mm, that of others "
             "0.05 mm");
-  const std::string many =
-      describe_position_error_outliers(errors_with({0, 2, 3, 5, 7, 9, 11, 12, 13}));
+  const std::string many = describe_error_outliers(errors_with({0, 2, 3, 5, 7, 9, 11, 12, 13}));
   EXPECT_EQ(many.substr(0, many.find(" have")),
             "captures 100, 102, 103, 105, 107, 109 and 1 more groups");
 }
 
-TEST(DescribePositionErrorOutliers, ReturnsEmptyTextWithoutGrossOutliers) {
-  EXPECT_EQ(describe_position_error_outliers(errors_with({})), "");
+TEST(DescribeErrorOutliers, ReturnsEmptyTextWithoutGrossOutliers) {
+  EXPECT_EQ(describe_error_outliers(errors_with({})), "");
   auto errors = errors_with({});
   errors[3].size = 0.004;
-  EXPECT_EQ(describe_position_error_outliers(errors), "") << "a camera may have it";
+  EXPECT_EQ(describe_error_outliers(errors), "") << "a camera may have it";
   for (CaptureError& error : errors) error.size = 0.05;
-  EXPECT_EQ(describe_position_error_outliers(errors), "") << "all of them";
-  EXPECT_EQ(describe_position_error_outliers({{"a", 1e-5}, {"b", 1}, {"c", 1e-5}}), "")
-      << "too few";
+  EXPECT_EQ(describe_error_outliers(errors), "") << "all of them";
+  EXPECT_EQ(describe_error_outliers({{"a", 1e-5}, {"b", 1}, {"c", 1e-5}}), "") << "too few";
 }
 
 TEST(DescribeResidualOutliers, NamesCapturesOnlyWhenAtLeastTwoAreOutliers) {

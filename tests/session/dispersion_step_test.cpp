@@ -20,7 +20,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(CollectCapturesAtKnownPositions, TakesPositionsOfTableElseGivenPosition) {
+TEST(CollectKnownCaptures, TakesPositionsOfTableElseGivenPosition) {
   const std::vector<Frame> frames{{"both", {}}, {"only x", {}}, {"not in table", {}}};
   CapturesTable table;
   table["both"].x_m = 1;
@@ -28,15 +28,15 @@ TEST(CollectCapturesAtKnownPositions, TakesPositionsOfTableElseGivenPosition) {
   table["both"].measured_point = MeasuredPoint::axis;
   table["both"].inclination = Inclination{0.1, 0.2};
   table["only x"].x_m = 3;
-  const KnownPositions of_table = collect_captures_at_known_positions(frames, table);
+  const KnownPositions of_table = collect_known_captures(frames, table);
   ASSERT_EQ(of_table.captures.size(), 1U);
   EXPECT_EQ(of_table.captures[0].reference_point_m, Eigen::Vector2d(1, 2));
   ASSERT_TRUE(of_table.captures[0].inclination);
   EXPECT_EQ(of_table.captures[0].inclination->pitch_rad, 0.2);
   EXPECT_THAT(of_table.measured_points, ElementsAre(MeasuredPoint::axis));
   EXPECT_EQ(of_table.captures_without_position, 2U);
-  const KnownPositions all = collect_captures_at_known_positions(
-      frames, table, Eigen::Vector2d(5, 6), MeasuredPoint::camera);
+  const KnownPositions all =
+      collect_known_captures(frames, table, Eigen::Vector2d(5, 6), MeasuredPoint::camera);
   ASSERT_EQ(all.captures.size(), 3U);
   EXPECT_EQ(all.captures[1].reference_point_m, Eigen::Vector2d(5, 6));
   EXPECT_THAT(all.measured_points,
@@ -50,7 +50,7 @@ SyntheticRig make_rig_with_tilted_camera() {
   return rig;
 }
 
-TEST(RunDispersionCalibrationStep, WarnsOfThreeCapturesWithoutStatedNoise) {
+TEST(RunDispersionStep, WarnsOfThreeCapturesWithoutStatedNoise) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   Random random(3);
   const auto list_warnings = [&](int captures, bool is_noise_stated) {
@@ -65,8 +65,8 @@ TEST(RunDispersionCalibrationStep, WarnsOfThreeCapturesWithoutStatedNoise) {
       known.measured_points.push_back(MeasuredPoint::camera);
     }
     const DispersionResult result =
-        run_dispersion_calibration_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
-                                        DispersionMethod::camera, DispersionCircle::mean, {});
+        run_dispersion_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
+                            DispersionMethod::camera, DispersionCircle::mean, {});
     EXPECT_TRUE(result.has_succeeded()) << result.message;
     return result.warnings;
   };
@@ -90,12 +90,12 @@ KnownPositions take_captures_at_origin(SyntheticRig rig, const Eigen::Vector2d& 
 }
 
 DispersionResult run_step(const SyntheticRig& rig, const KnownPositions& known) {
-  return run_dispersion_calibration_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
-                                         DispersionMethod::camera, DispersionCircle::mean,
-                                         {"", "test", "1.2", "", {}});
+  return run_dispersion_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
+                             DispersionMethod::camera, DispersionCircle::mean,
+                             {"", "test", "1.2", "", {}});
 }
 
-TEST(RunDispersionCalibrationStep, ReplacesEarlierDispersion) {
+TEST(RunDispersionStep, ReplacesEarlierDispersion) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   const KnownPositions known = take_captures_at_origin(rig, {0.4, -0.3});
   const DispersionResult once = run_step(rig, known);
@@ -107,7 +107,7 @@ TEST(RunDispersionCalibrationStep, ReplacesEarlierDispersion) {
   EXPECT_EQ(twice.calibration.dispersion->offset_px, once.calibration.dispersion->offset_px);
 }
 
-TEST(RunDispersionCalibrationStep, MetricsAreRadiusAndLengthOfOffset) {
+TEST(RunDispersionStep, MetricsAreRadiusAndLengthOfOffset) {
   const SyntheticRig rig = make_rig_with_tilted_camera();
   const DispersionResult result = run_step(rig, take_captures_at_origin(rig, {0.4, -0.3}));
   ASSERT_TRUE(result.has_succeeded()) << result.message;
@@ -126,7 +126,7 @@ TEST(RunDispersionCalibrationStep, MetricsAreRadiusAndLengthOfOffset) {
   EXPECT_TRUE(result.drawing);
 }
 
-TEST(RunDispersionCalibrationStep, WarnsIfCalibrationHasNoRotationCenter) {
+TEST(RunDispersionStep, WarnsIfCalibrationHasNoRotationCenter) {
   const auto warning = HasSubstr("the calibration has no rotation_center: run vlp-rotation first");
   SyntheticRig rig{synthetic_lamps(), {synthetic_camera(), {}, {}, {}, {}}, {}, {}};
   const KnownPositions known = take_captures_at_origin(rig, {0.1, 0});
@@ -137,7 +137,7 @@ TEST(RunDispersionCalibrationStep, WarnsIfCalibrationHasNoRotationCenter) {
   EXPECT_THAT(run_step(rig, known).warnings, testing::IsEmpty());
 }
 
-TEST(RunDispersionCalibrationStep, FailsForPositionsOfAxisWithoutLeverArm) {
+TEST(RunDispersionStep, FailsForPositionsOfAxisWithoutLeverArm) {
   const SyntheticRig rig = make_rig_with_tilted_camera();
   KnownPositions known = take_captures_at_origin(rig, {0, 0});
   known.measured_points[3] = MeasuredPoint::axis;
@@ -147,7 +147,7 @@ TEST(RunDispersionCalibrationStep, FailsForPositionsOfAxisWithoutLeverArm) {
                                         "has no lever arm"));
 }
 
-TEST(RunDispersionCalibrationStep, FailsForCapturesFarFromPosition) {
+TEST(RunDispersionStep, FailsForCapturesFarFromPosition) {
   const SyntheticRig rig = make_rig_with_tilted_camera();
   KnownPositions known = take_captures_at_origin(rig, {0, 0});
   for (ReferencePointCapture& capture : known.captures) capture.reference_point_m.x() += 1;
@@ -156,7 +156,7 @@ TEST(RunDispersionCalibrationStep, FailsForCapturesFarFromPosition) {
   EXPECT_FALSE(result.calibration.dispersion);
 }
 
-TEST(RunDispersionCalibrationStep, FailureNamesStatusOfFirstFix) {
+TEST(RunDispersionStep, FailureNamesStatusOfFirstFix) {
   const SyntheticRig rig = make_rig_with_tilted_camera();
   KnownPositions known = take_captures_at_origin(rig, {0, 0});
   for (ReferencePointCapture& capture : known.captures) capture.detections.resize(1);
@@ -167,7 +167,7 @@ TEST(RunDispersionCalibrationStep, FailureNamesStatusOfFirstFix) {
       HasSubstr("; the first: " + std::string(describe_fix_status(FixStatus::too_few_lamps))));
 }
 
-TEST(RunDispersionCalibrationStep, HasNoCovarianceForEnclosingCircleOfPositionsOfAxis) {
+TEST(RunDispersionStep, HasNoCovarianceForEnclosingCircleOfPositionsOfAxis) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0, 0);
   KnownPositions known = take_captures_at_origin(rig, {0.1, 0});
@@ -177,14 +177,14 @@ TEST(RunDispersionCalibrationStep, HasNoCovarianceForEnclosingCircleOfPositionsO
   for (const auto& [circle, has_covariance] :
        {std::pair(DispersionCircle::enclosing, false), {DispersionCircle::mean, true}}) {
     const DispersionResult result =
-        run_dispersion_calibration_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
-                                        DispersionMethod::chen_guan, circle, {});
+        run_dispersion_step({{}, rig.map, "lamps.yaml", rig.calibration}, known,
+                            DispersionMethod::chen_guan, circle, {});
     ASSERT_TRUE(result.has_succeeded()) << result.message;
     EXPECT_EQ(result.calibration.covariance.has_value(), has_covariance);
   }
 }
 
-TEST(RunDispersionCalibrationStep, OffsetHasErrorsOfLeverArmForPositionsOfAxisOnly) {
+TEST(RunDispersionStep, OffsetHasErrorsOfLeverArmForPositionsOfAxisOnly) {
   for (const MeasuredPoint point : {MeasuredPoint::camera, MeasuredPoint::axis}) {
     SyntheticRig rig = make_rig_with_tilted_camera();
     KnownPositions known = take_captures_at_origin(rig, {0, 0});
@@ -196,8 +196,7 @@ TEST(RunDispersionCalibrationStep, OffsetHasErrorsOfLeverArmForPositionsOfAxisOn
       return result;
     };
     const auto find_covariance = [&] {
-      const auto covariance =
-          compute_dispersion_offset_covariance(run_with_arm({0, 0}).calibration);
+      const auto covariance = compute_offset_covariance(run_with_arm({0, 0}).calibration);
       EXPECT_TRUE(covariance);
       return covariance.value_or(Matrix2::Zero());
     };
@@ -217,7 +216,7 @@ TEST(RunDispersionCalibrationStep, OffsetHasErrorsOfLeverArmForPositionsOfAxisOn
   }
 }
 
-TEST(RunDispersionCalibrationStep, DoesNotReportMovedLampForSingleYaw) {
+TEST(RunDispersionStep, DoesNotReportMovedLampForSingleYaw) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   const LampMap map = rig.map;
   rig.map.lamps[1].position_m.x() += 0.01;
@@ -229,14 +228,14 @@ TEST(RunDispersionCalibrationStep, DoesNotReportMovedLampForSingleYaw) {
     known.measured_points.push_back(MeasuredPoint::camera);
     input.frames.push_back({std::to_string(i), known.captures.back().detections});
   }
-  const DispersionResult result = run_dispersion_calibration_step(
-      input, known, DispersionMethod::camera, DispersionCircle::mean, {});
+  const DispersionResult result =
+      run_dispersion_step(input, known, DispersionMethod::camera, DispersionCircle::mean, {});
   EXPECT_EQ(result.failure, StepFailure::undetermined) << result.message;
   EXPECT_THAT(result.message, Not(HasSubstr("lamp 2")));
 }
 
 /// Positions of the rotation axis, stated as camera positions; the lever arm is 20 mm.
-TEST(RunDispersionCalibrationStep, WarnsIfOffsetEqualsLeverArm) {
+TEST(RunDispersionStep, WarnsIfOffsetEqualsLeverArm) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   KnownPositions known;
   for (int i = 0; i < 8; ++i) {

@@ -35,14 +35,14 @@ EvaluationInput make_evaluation_input(int count, double error_m) {
   return input;
 }
 
-TEST(EvaluateFixesAgainstTruth, IsUndeterminedOnlyIfNoCaptureHasFix) {
+TEST(EvaluateWithTruth, IsUndeterminedOnlyIfNoCaptureHasFix) {
   FixRow fix{"a.png", "ok", FixRow::Fix{{{1.003, 2.004, 0}, 0}, {}, 0.1}, 4};
   FixRow missing{"b.png", "too_few_lamps", {}, 1};
   EvaluationInput input;
   input.fixes = {"fixes.csv", {fix, missing}};
   const auto make_truth = [](const char* image) { return TruthRow{image, {1, 2}, {}, {}}; };
   input.truth = FileRows<TruthRow>{"truth.csv", {make_truth("a.png"), make_truth("b.png")}};
-  const EvaluateResult one = evaluate_fixes_against_truth(input, {});
+  const EvaluateResult one = evaluate_with_truth(input, {});
   ASSERT_TRUE(one.has_succeeded()) << one.message;
   EXPECT_EQ(one.evaluation.fixes, 1U);
   fix.fix.reset();
@@ -50,49 +50,49 @@ TEST(EvaluateFixesAgainstTruth, IsUndeterminedOnlyIfNoCaptureHasFix) {
   input.fixes.rows = {fix, missing, missing};
   input.fixes.rows[2].image = "c.png";
   input.truth->rows.push_back(make_truth("c.png"));
-  const EvaluateResult none = evaluate_fixes_against_truth(input, {});
+  const EvaluateResult none = evaluate_with_truth(input, {});
   EXPECT_EQ(none.failure, StepFailure::undetermined);
   EXPECT_THAT(none.message, testing::HasSubstr("none of 3 captures has a fix (2 of them: "
                                                "too_few_lamps)"));
 }
 
-TEST(EvaluateFixesAgainstTruth, WarnsIfErrorsAreBelowTheoreticalLimit) {
+TEST(EvaluateWithTruth, WarnsIfErrorsAreBelowTheoreticalLimit) {
   EvaluationInput input = make_evaluation_input(12, 1e-4);
   const auto below = HasSubstr("times the theoretical limit: either the stated pixel noise");
   input.crlb_input = EvaluationInput::CrlbInput{synthetic_lamps(), synthetic_camera(), 5};
-  const EvaluateResult small = evaluate_fixes_against_truth(input, {});
+  const EvaluateResult small = evaluate_with_truth(input, {});
   ASSERT_TRUE(small.has_succeeded()) << small.message;
   EXPECT_THAT(small.warnings, ElementsAre(below));
   input.crlb_input->noise_px = 1e-3;
-  EXPECT_THAT(evaluate_fixes_against_truth(input, {}).warnings, IsEmpty());
+  EXPECT_THAT(evaluate_with_truth(input, {}).warnings, IsEmpty());
 }
 
-TEST(EvaluateFixesAgainstTruth, WarnsIfTruthDoesNotDetermineTheoreticalLimit) {
+TEST(EvaluateWithTruth, WarnsIfTruthDoesNotDetermineTheoreticalLimit) {
   EvaluationInput input = make_evaluation_input(12, 1e-3);
   const auto missing = HasSubstr("no theoretical limit: the ground truth has no z_m and yaw_rad");
-  EXPECT_THAT(evaluate_fixes_against_truth(input, {}).warnings, IsEmpty()) << "was not asked";
+  EXPECT_THAT(evaluate_with_truth(input, {}).warnings, IsEmpty()) << "was not asked";
   input.crlb_input = EvaluationInput::CrlbInput{synthetic_lamps(), synthetic_camera(), 0.1};
-  EXPECT_THAT(evaluate_fixes_against_truth(input, {}).warnings, Not(Contains(missing)));
+  EXPECT_THAT(evaluate_with_truth(input, {}).warnings, Not(Contains(missing)));
   for (TruthRow& row : input.truth->rows) row.yaw_rad.reset();
-  EXPECT_THAT(evaluate_fixes_against_truth(input, {}).warnings, ElementsAre(missing));
+  EXPECT_THAT(evaluate_with_truth(input, {}).warnings, ElementsAre(missing));
 }
 
-TEST(EvaluateFixesAgainstTruth, WarnsIfFixesDetermineNoLine) {
+TEST(EvaluateWithTruth, WarnsIfFixesDetermineNoLine) {
   EvaluationInput input = make_evaluation_input(12, 0);
   input.truth.reset();
   input.line_m = CommandedLine{Eigen::Vector2d(-0.3, 0.1), Eigen::Vector2d(0.3, 0.1)};
   const auto no_line = HasSubstr("no line is fitted: the fixes do not determine a direction");
-  EXPECT_THAT(evaluate_fixes_against_truth(input, {}).warnings, Not(Contains(no_line)));
+  EXPECT_THAT(evaluate_with_truth(input, {}).warnings, Not(Contains(no_line)));
   for (FixRow& row : input.fixes.rows) row.fix->pose.position_m.setZero();
-  EXPECT_THAT(evaluate_fixes_against_truth(input, {}).warnings, Contains(no_line));
+  EXPECT_THAT(evaluate_with_truth(input, {}).warnings, Contains(no_line));
 }
 
-TEST(EvaluateFixesAgainstTruth, WarnsOfMissingFixesThatNoGateLimits) {
+TEST(EvaluateWithTruth, WarnsOfMissingFixesThatNoGateLimits) {
   EvaluationInput input = make_evaluation_input(4, 1e-3);
   input.fixes.rows[2].fix.reset();
   input.fixes.rows[2].status = "too_few_lamps";
   const std::string caution = "1 of 4 captures has no fix, and there is no gate 'missing_fraction'";
-  const EvaluateResult result = evaluate_fixes_against_truth(input, {{"mean_mm", 2}});
+  const EvaluateResult result = evaluate_with_truth(input, {{"mean_mm", 2}});
   EXPECT_EQ(result.caution, caution);
   EXPECT_THAT(result.warnings, ElementsAre(caution));
   ASSERT_EQ(result.gates.size(), 1U);
@@ -101,7 +101,7 @@ TEST(EvaluateFixesAgainstTruth, WarnsOfMissingFixesThatNoGateLimits) {
   EXPECT_TRUE(result.gates[0].has_passed_gate());
   EXPECT_THAT(result.notes, Contains(HasSubstr("too few captures with a fix for intervals")));
   const std::vector<Gate> limited{{"mean_mm", 2}, {"missing_fraction", 0.5}};
-  EXPECT_THAT(evaluate_fixes_against_truth(input, limited).warnings, IsEmpty());
+  EXPECT_THAT(evaluate_with_truth(input, limited).warnings, IsEmpty());
 }
 
 TEST(ComputeSamePositionRadius, IsMillimeterPlusTwiceLengthOfLeverArm) {
@@ -113,10 +113,10 @@ TEST(ComputeSamePositionRadius, IsMillimeterPlusTwiceLengthOfLeverArm) {
   EXPECT_DOUBLE_EQ(compute_same_position_radius_m(calibration), 0.101);
 }
 
-class RenderEvaluationReportHtml : public testing::Test {
+class RenderEvaluationHtml : public testing::Test {
  protected:
   std::string render() const {
-    return render_evaluation_report_html({input, result, synthetic_lamps(), drives, page});
+    return render_evaluation_html({input, result, synthetic_lamps(), drives, page});
   }
   std::string find_title() const {
     const std::string html = render();
@@ -124,12 +124,12 @@ class RenderEvaluationReportHtml : public testing::Test {
     return html.substr(begin, html.find("</title>") - begin);
   }
   const EvaluationInput input = make_evaluation_input(12, 1e-3);
-  EvaluateResult result = evaluate_fixes_against_truth(input, {});
+  EvaluateResult result = evaluate_with_truth(input, {});
   std::vector<Drive> drives;
   Report page;
 };
 
-TEST_F(RenderEvaluationReportHtml, TitleIsNameOfCameraElseOfFixes) {
+TEST_F(RenderEvaluationHtml, TitleIsNameOfCameraElseOfFixes) {
   EXPECT_EQ(find_title(), "Accuracy report: fixes.csv");
   page.calibration = Calibration{synthetic_camera(), {}, {}, {}, {}};
   page.calibration->camera.id = "";
@@ -138,7 +138,7 @@ TEST_F(RenderEvaluationReportHtml, TitleIsNameOfCameraElseOfFixes) {
   EXPECT_EQ(find_title(), "Accuracy report: unit-7");
 }
 
-TEST_F(RenderEvaluationReportHtml, ContainsPlotAndStatisticsOfEachDrive) {
+TEST_F(RenderEvaluationHtml, ContainsPlotAndStatisticsOfEachDrive) {
   drives.push_back({input.fixes, {Eigen::Vector2d(-0.3, 0.1), Eigen::Vector2d(0.3, 0.1)}});
   drives.back().fixes.file = "folder/line-y-fixes.csv";
   const std::string html = render();

@@ -28,30 +28,30 @@ LensInput views_with_edges(double shift_px) {
   return input;
 }
 
-TEST(RunLensCalibrationStep, WarnsOfSixTenthsButNotThreeTenthsPixelEdgeDisplacement) {
-  EXPECT_THAT(run_lens_calibration_step(views_with_edges(0.3), {}).warnings, IsEmpty());
-  const LensResult result = run_lens_calibration_step(views_with_edges(0.6), {});
+TEST(RunLensStep, WarnsOfSixTenthsButNotThreeTenthsPixelEdgeDisplacement) {
+  EXPECT_THAT(run_lens_step(views_with_edges(0.3), {}).warnings, IsEmpty());
+  const LensResult result = run_lens_step(views_with_edges(0.6), {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_THAT(result.warnings, Contains(HasSubstr("0.60 px towards the dark")));
   EXPECT_THAT(result.warnings, Contains(HasSubstr("is tag_spacing of board.yaml right?")));
 }
 
-TEST(RunLensCalibrationStep, WarnsWhenViewsAreTooFewToHoldOut) {
+TEST(RunLensStep, WarnsWhenViewsAreTooFewToHoldOut) {
   LensInput input = views_with_edges(0);
   input.held_out = 30;
-  EXPECT_THAT(run_lens_calibration_step(input, {}).warnings,
+  EXPECT_THAT(run_lens_step(input, {}).warnings,
               Contains("no view is held out: 20 views are fewer than 30"));
   input.held_out = 10;
-  EXPECT_THAT(run_lens_calibration_step(input, {}).warnings, IsEmpty());
+  EXPECT_THAT(run_lens_step(input, {}).warnings, IsEmpty());
 }
 
-TEST(RunLensCalibrationStep, ReportsViewsResidualAndWarpOnlyIfItIsEstimated) {
+TEST(RunLensStep, ReportsViewsResidualAndWarpOnlyIfItIsEstimated) {
   LensInput input = views_with_edges(0);
   input.camera.id = "unit-7";
   input.camera.row_time_s = 3e-5;
   for (const WarpChoice warp : {WarpChoice::on, WarpChoice::off}) {
     input.warp = warp;
-    const LensResult result = run_lens_calibration_step(input, {"", "test", "1.2", "", {}});
+    const LensResult result = run_lens_step(input, {"", "test", "1.2", "", {}});
     ASSERT_TRUE(result.has_succeeded()) << result.message;
     const auto& report = result.calibration.intrinsics_report;
     ASSERT_TRUE(report);
@@ -75,20 +75,20 @@ TEST(RunLensCalibrationStep, ReportsViewsResidualAndWarpOnlyIfItIsEstimated) {
   }
 }
 
-TEST(RunLensCalibrationStep, FailureForFewViewsCountsRejectedImages) {
+TEST(RunLensStep, FailureForFewViewsCountsRejectedImages) {
   LensInput input = views_with_edges(0);
   input.observations.images.resize(2);
-  const LensResult few = run_lens_calibration_step(input, {});
+  const LensResult few = run_lens_step(input, {});
   EXPECT_EQ(few.failure, StepFailure::undetermined);
   EXPECT_THAT(few.message, testing::Not(HasSubstr("not used: ")));
-  input.observations.images[1].set_image_rejection(RejectionReason::blurred, "is blurred");
-  const LensResult rejected = run_lens_calibration_step(input, {});
+  input.observations.images[1].reject(RejectionReason::blurred, "is blurred");
+  const LensResult rejected = run_lens_step(input, {});
   EXPECT_EQ(rejected.failure, StepFailure::undetermined);
   EXPECT_THAT(rejected.message, HasSubstr("; not used: 1 blurred"));
   for (Observation& image : input.observations.images) {
-    image.set_image_rejection(RejectionReason::blurred, "is blurred");
+    image.reject(RejectionReason::blurred, "is blurred");
   }
-  const LensResult none = run_lens_calibration_step(input, {});
+  const LensResult none = run_lens_step(input, {});
   EXPECT_EQ(none.failure, StepFailure::undetermined);
   EXPECT_THAT(none.message, HasSubstr("2 blurred"));
 }

@@ -67,7 +67,7 @@ TEST_P(LocateCameraFromNoisyDetections, ReportedSdsMatchErrorsOfFixes) {
   Eigen::Vector4d squares = Eigen::Vector4d::Zero();
   int fixes = 0, within = 0;
   for (int i = 0; i < draws; ++i) {
-    const LocateResult found = locate_camera_from_detections(draw_captures());
+    const LocateResult found = locate_from_detections(draw_captures());
     ASSERT_TRUE(found.has_succeeded());
     for (std::size_t k = 0; k < truth.size(); ++k) {
       const auto& fix = found.rows[k].fix;
@@ -93,7 +93,7 @@ TEST_P(LocateCameraFromNoisyDetections, ReportedSdsMatchErrorsOfFixes) {
 
 /// The noise part of the sd is that of the true noise, whatever is stated, beside errors of the map
 /// that are several times as large.
-TEST(LocateCameraFromDetections, NoiseSdIsThatOfPixelsBesideErrorsOfMap) {
+TEST(LocateFromDetections, NoiseSdIsThatOfPixelsBesideErrorsOfMap) {
   constexpr double map_sd_m = 0.002;
   for (const double stated_to_true : {0.0, 1 / 1.4, 1.0}) {
     Random random(31);
@@ -117,7 +117,7 @@ TEST(LocateCameraFromDetections, NoiseSdIsThatOfPixelsBesideErrorsOfMap) {
         }
         input.frames.push_back({std::to_string(k), seen});
       }
-      const LocateResult found = locate_camera_from_detections(input);
+      const LocateResult found = locate_from_detections(input);
       ASSERT_TRUE(found.has_succeeded());
       double ratio = 0;
       for (int k = 0; k < captures; ++k) {

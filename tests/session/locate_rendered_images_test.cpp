@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// locate_camera_from_images() with rendered images.
+/// locate_from_images() with rendered images.
 #include <gmock/gmock.h>
 
 #include "frontend/image_file.h"
@@ -17,16 +17,16 @@ namespace fs = std::filesystem;
 using testing::Contains;
 using testing::HasSubstr;
 
-class LocateCameraFromImages : public RenderedSession {
+class LocateFromImages : public RenderedSession {
  protected:
-  LocateCameraFromImages() {
+  LocateFromImages() {
     calibration.camera = truth().camera;
     calibration.rotation_center = truth().rotation_center;
   }
   LocateResult locate(const std::string& captures, const LocateInput& input) const {
     const LampImages images{session_file(captures), input.lamps, session_file("lamps.yaml"),
                             input.calibration, session_file("camera.yaml")};
-    return locate_camera_from_images(images, ImageUse::fixes, input, frontend);
+    return locate_from_images(images, ImageUse::fixes, input, frontend);
   }
   LocateInput make_input() const { return {{}, lamps, calibration}; }
 
@@ -49,14 +49,14 @@ double find_largest_error_m(const LocateResult& result, const fs::path& check) {
   return largest_m;
 }
 
-TEST_F(LocateCameraFromImages, LocatesCameraOfEachImage) {
+TEST_F(LocateFromImages, LocatesCameraOfEachImage) {
   const LocateResult result = locate("check", make_input());
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_LT(find_largest_error_m(result, session_file("check")), 3e-4);
   EXPECT_EQ(result.observations.images.size(), 6U);
 }
 
-TEST_F(LocateCameraFromImages, DetectionsAreThoseOfLibraryIfTiltIsEstimated) {
+TEST_F(LocateFromImages, DetectionsAreThoseOfLibraryIfTiltIsEstimated) {
   LocateInput input = make_input();
   input.roll_pitch_sd_rad = 0.1;
   const LocateResult result = locate("check", input);
@@ -70,14 +70,14 @@ TEST_F(LocateCameraFromImages, DetectionsAreThoseOfLibraryIfTiltIsEstimated) {
     const cv::Mat pixels = read_image(image.file);
     const auto found = locate_camera_in_image(positioner, detector, to_image_view(pixels), sensors);
     ASSERT_TRUE(found.fix.has_succeeded());
-    const auto expected = collect_identified_lamps(image);
+    const auto expected = list_identified(image);
     ASSERT_EQ(found.detections.size(), expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i)
       EXPECT_EQ(found.detections[i].pixel, expected[i].pixel);
   }
 }
 
-TEST_F(LocateCameraFromImages, EstimatesReadoutThatCalibrationLacks) {
+TEST_F(LocateFromImages, EstimatesReadoutThatCalibrationLacks) {
   LocateInput input = make_input();
   input.calibration.camera.readout.reset();
   input.motion = KnownMotion::make_motion_prior_from_limits(0.5, 0);
@@ -86,7 +86,7 @@ TEST_F(LocateCameraFromImages, EstimatesReadoutThatCalibrationLacks) {
   EXPECT_THAT(result.notes, Contains(HasSubstr("the images show stripes along rows")));
 }
 
-TEST_F(LocateCameraFromImages, SkipsDamagedImage) {
+TEST_F(LocateFromImages, SkipsDamagedImage) {
   write_session_file("check/0003.png", "no image");
   const LocateResult result = locate("check", make_input());
   ASSERT_TRUE(result.has_succeeded()) << result.message;
@@ -95,7 +95,7 @@ TEST_F(LocateCameraFromImages, SkipsDamagedImage) {
   EXPECT_EQ(result.skipped[0].image, "0003.png");
 }
 
-TEST_F(LocateCameraFromImages, FailsIfNoLampIsIdentified) {
+TEST_F(LocateFromImages, FailsIfNoLampIsIdentified) {
   LocateInput input = make_input();
   for (Lamp& lamp : input.lamps.lamps) lamp.frequency_hz = *lamp.frequency_hz * 3;
   const LocateResult result = locate("check", input);
@@ -103,7 +103,7 @@ TEST_F(LocateCameraFromImages, FailsIfNoLampIsIdentified) {
   EXPECT_THAT(result.rows, testing::IsEmpty());
 }
 
-TEST_F(LocateCameraFromImages, WritesAnnotatedImagesOnRequest) {
+TEST_F(LocateFromImages, WritesAnnotatedImagesOnRequest) {
   frontend.annotate = folder / "annotated";
   ASSERT_TRUE(locate("check", make_input()).has_succeeded());
   EXPECT_TRUE(fs::exists(folder / "annotated"));

@@ -25,23 +25,23 @@ LocateInput example() {
           read_calibration(kExample + "calibration.yaml")};
 }
 
-TEST(LocateCameraFromDetections, ReturnsFixForEachFrameOfExample) {
-  const LocateResult found = locate_camera_from_detections(example());
+TEST(LocateFromDetections, ReturnsFixForEachFrameOfExample) {
+  const LocateResult found = locate_from_detections(example());
   EXPECT_TRUE(found.has_succeeded());
   EXPECT_EQ(found.summary.fixes, found.rows.size());
   EXPECT_THAT(found.warnings, IsEmpty());
   EXPECT_THAT(found.rejected_lamps, IsEmpty());
 }
 
-TEST(LocateCameraFromDetections, CountsDetectionsOfLampsMissingInMap) {
+TEST(LocateFromDetections, CountsDetectionsOfLampsMissingInMap) {
   LocateInput input = example();
   ASSERT_GT(input.frames.size(), 2U);
   for (std::size_t i = 0; i < 2; ++i) input.frames[i].detections.push_back({99, {400, 300}, 0.05});
-  EXPECT_THAT(locate_camera_from_detections(input).warnings,
+  EXPECT_THAT(locate_from_detections(input).warnings,
               ElementsAre("2 detections of lamps not in the map, rejected"));
 }
 
-TEST(LocateCameraFromDetections, WarnsOfTiltedCameraUnlessTiltIsEstimated) {
+TEST(LocateFromDetections, WarnsOfTiltedCameraUnlessTiltIsEstimated) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   LocateInput input{{}, rig.map, rig.calibration};
   rig.body.motion.inclination = {0.03, -0.04};
@@ -52,12 +52,12 @@ TEST(LocateCameraFromDetections, WarnsOfTiltedCameraUnlessTiltIsEstimated) {
   const auto warning = HasSubstr(
       "the images fit a tilted camera, by 2.9 degrees: state "
       "inclinations in captures.csv, or --roll-pitch-sd-deg");
-  EXPECT_THAT(locate_camera_from_detections(input).warnings, testing::Contains(warning));
+  EXPECT_THAT(locate_from_detections(input).warnings, testing::Contains(warning));
   input.roll_pitch_sd_rad = 0.1;
-  EXPECT_THAT(locate_camera_from_detections(input).warnings, Not(testing::Contains(warning)));
+  EXPECT_THAT(locate_from_detections(input).warnings, Not(testing::Contains(warning)));
 }
 
-TEST(LocateCameraFromDetections, LampOffsetsEqualDisplacementOfMovedLamp) {
+TEST(LocateFromDetections, LampOffsetsEqualDisplacementOfMovedLamp) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   LocateInput input{{}, rig.map, rig.calibration};
   const Eigen::Vector2d moved_m(1e-3, -2e-3);
@@ -68,9 +68,9 @@ TEST(LocateCameraFromDetections, LampOffsetsEqualDisplacementOfMovedLamp) {
   }
   input.frames.push_back({"twice", input.frames.back().detections});
   input.frames.back().detections.push_back(input.frames.back().detections.front());
-  EXPECT_THAT(locate_camera_from_detections(input).lamp_offsets, IsEmpty()) << "was not asked";
+  EXPECT_THAT(locate_from_detections(input).lamp_offsets, IsEmpty()) << "was not asked";
   input.compute_lamp_offsets = true;
-  const auto offsets = locate_camera_from_detections(input).lamp_offsets;
+  const auto offsets = locate_from_detections(input).lamp_offsets;
   ASSERT_EQ(offsets.size(), rig.map.lamps.size());
   for (const LampOffset& offset : offsets) {
     const auto seen =
@@ -99,8 +99,7 @@ LocateInput room_with_a_moved_lamp(double by_m) {
   std::vector<JointCovariance::LampPosition> lamps;
   for (const Lamp& lamp : rig.map.lamps) lamps.push_back({lamp.id, lamp.position_m});
   input.calibration.adjustment = Adjustment{{"made up"}, 1, 1, 0.1};
-  input.calibration.covariance =
-      make_adjusted_covariance(input.calibration.camera, lamps, covariance);
+  input.calibration.covariance = make_covariance(input.calibration.camera, lamps, covariance);
   rig.map.lamps[1].position_m.x() += by_m;
   Random random(5);
   for (int i = 0; i < 36; ++i) {
@@ -113,8 +112,8 @@ LocateInput room_with_a_moved_lamp(double by_m) {
   return input;
 }
 
-TEST(LocateCameraFromDetections, WarnsOfMovedLampAndItsDisplacement) {
-  const LocateResult found = locate_camera_from_detections(room_with_a_moved_lamp(0.03));
+TEST(LocateFromDetections, WarnsOfMovedLampAndItsDisplacement) {
+  const LocateResult found = locate_from_detections(room_with_a_moved_lamp(0.03));
   EXPECT_THAT(found.warnings,
               testing::Contains("lamp 2 hangs 30 mm from where the map has it (x +30 mm, y +0 mm): "
                                 "moved, or entered wrongly"));
@@ -127,19 +126,19 @@ TEST(LocateCameraFromDetections, WarnsOfMovedLampAndItsDisplacement) {
     EXPECT_THAT(found.rows[i].rejected_lamps,
                 testing::ElementsAreArray(std::vector<int>(i < 12 ? 1U : 0U, 2)));
   }
-  EXPECT_THAT(locate_camera_from_detections(room_with_a_moved_lamp(0)).rejected_lamps, IsEmpty());
+  EXPECT_THAT(locate_from_detections(room_with_a_moved_lamp(0)).rejected_lamps, IsEmpty());
 }
 
-TEST(LocateCameraFromDetections, RollOfCapturesTableMovesFixAlongY) {
+TEST(LocateFromDetections, RollOfCapturesTableMovesFixAlongY) {
   LocateInput input = example();
-  const LocateResult level = locate_camera_from_detections(input);
+  const LocateResult level = locate_from_detections(input);
   ASSERT_FALSE(level.rows.empty());
   ASSERT_TRUE(level.rows[0].fix);
   const Eigen::Vector3d level_m = level.rows[0].fix->pose.position_m;
   Capture leaning;
   leaning.inclination = Inclination{0.01, 0};
   input.captures[input.frames[0].image] = leaning;
-  const LocateResult found = locate_camera_from_detections(input);
+  const LocateResult found = locate_from_detections(input);
   ASSERT_TRUE(found.rows[0].fix);
   // The yaw is 0 and the lamps are 1.6 m above: a roll displaces the fix by 1.6 m sin(roll).
   const Eigen::Vector3d moved_m = found.rows[0].fix->pose.position_m - level_m;
@@ -151,10 +150,10 @@ TEST(LocateCameraFromDetections, RollOfCapturesTableMovesFixAlongY) {
                                                           " images are not in captures.csv")));
 }
 
-TEST(LocateCameraFromDetections, ReturnsUndeterminedIfNoFrameHasFix) {
+TEST(LocateFromDetections, ReturnsUndeterminedIfNoFrameHasFix) {
   LocateInput input = example();
   for (Frame& frame : input.frames) frame.detections.resize(1);
-  const LocateResult found = locate_camera_from_detections(input);
+  const LocateResult found = locate_from_detections(input);
   EXPECT_EQ(found.failure, StepFailure::undetermined);
   EXPECT_THAT(found.message, HasSubstr("no frame has a fix; the first: "));
 }
@@ -175,7 +174,7 @@ LocateInput drive(double speed_m_per_s) {
 }
 
 double worst_error_m(const LocateInput& input, double speed_m_per_s) {
-  const LocateResult found = locate_camera_from_detections(input);
+  const LocateResult found = locate_from_detections(input);
   double worst_m = 0;
   for (std::size_t i = 0; i < found.rows.size(); ++i) {
     if (!found.rows[i].fix) return 1;
@@ -185,12 +184,12 @@ double worst_error_m(const LocateInput& input, double speed_m_per_s) {
   return worst_m;
 }
 
-TEST(LocateCameraFromDetections, EstimatesTrueVelocityWithMotionPrior) {
+TEST(LocateFromDetections, EstimatesTrueVelocityWithMotionPrior) {
   LocateInput input = drive(1);
   EXPECT_GT(worst_error_m(input, 1), 4e-3);
   input.motion = KnownMotion::make_motion_prior_from_limits(200, 200);  // of no weight
   EXPECT_LT(worst_error_m(input, 1), 1e-6);
-  const LocateResult found = locate_camera_from_detections(input);
+  const LocateResult found = locate_from_detections(input);
   EXPECT_NEAR(found.rows[1].fix->velocity_m_per_s->x(), 1, 1e-4);
   EXPECT_NEAR(found.rows[1].fix->velocity_m_per_s->y(), 0, 1e-4);
   EXPECT_EQ(found.rows[1].time_s, 10.1);
@@ -199,16 +198,16 @@ TEST(LocateCameraFromDetections, EstimatesTrueVelocityWithMotionPrior) {
   EXPECT_FALSE(found.rows[1].fix->noise_sd) << "nothing is known of common errors";
 }
 
-TEST(LocateCameraFromDetections, LocatesMovingCameraExactlyWithOdometry) {
+TEST(LocateFromDetections, LocatesMovingCameraExactlyWithOdometry) {
   LocateInput input = drive(1);
   for (auto& [image, capture] : input.captures) {
     capture.velocity_m_per_s = Eigen::Rotation2Dd(-0.3) * Eigen::Vector2d(1, 0);
   }
   EXPECT_LT(worst_error_m(input, 1), 1e-9);
-  EXPECT_NEAR(locate_camera_from_detections(input).rows[0].fix->velocity_m_per_s->x(), 1, 1e-9);
+  EXPECT_NEAR(locate_from_detections(input).rows[0].fix->velocity_m_per_s->x(), 1, 1e-9);
 }
 
-TEST(LocateCameraFromDetections, WindowOfTwoUsesLatestEarlierFrameWithTime) {
+TEST(LocateFromDetections, WindowOfTwoUsesLatestEarlierFrameWithTime) {
   LocateInput input = drive(1);
   for (Frame& frame : input.frames) frame.detections.resize(2);
   input.motion = KnownMotion::make_motion_prior_from_limits(2, 0);
@@ -217,7 +216,7 @@ TEST(LocateCameraFromDetections, WindowOfTwoUsesLatestEarlierFrameWithTime) {
   sensors.motion = input.motion;
   const Positioner positioner(input.lamps, input.calibration);
   for (const auto& [earlier, before_s] : {std::pair(1U, 0.1), {0U, 0.2}}) {
-    const LocateResult found = locate_camera_from_detections(input);
+    const LocateResult found = locate_from_detections(input);
     ASSERT_TRUE(found.rows[2].fix);
     const Fix fix = positioner.compute_position_fix(
         input.frames[2].detections, sensors,
@@ -228,23 +227,23 @@ TEST(LocateCameraFromDetections, WindowOfTwoUsesLatestEarlierFrameWithTime) {
   }
 }
 
-TEST(LocateCameraFromDetections, ThrowsForMotionWithoutRowTime) {
+TEST(LocateFromDetections, ThrowsForMotionWithoutRowTime) {
   LocateInput input = drive(1);
   input.motion = KnownMotion::make_motion_prior_from_limits(2, 0);
   input.calibration.camera.row_time_s.reset();
-  EXPECT_THROW(locate_camera_from_detections(input), std::invalid_argument);
+  EXPECT_THROW(locate_from_detections(input), std::invalid_argument);
   input.motion.reset();
-  EXPECT_NO_THROW(locate_camera_from_detections(input));
+  EXPECT_NO_THROW(locate_from_detections(input));
   input.captures["a"].velocity_m_per_s = Eigen::Vector2d(1, 0);
-  EXPECT_THROW(locate_camera_from_detections(input), std::invalid_argument);
+  EXPECT_THROW(locate_from_detections(input), std::invalid_argument);
 }
 
-TEST(LocateCameraFromDetections, EstimatesTrueTiltWithoutInclinationSensor) {
+TEST(LocateFromDetections, EstimatesTrueTiltWithoutInclinationSensor) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   rig.body.motion.inclination = {0.1, -0.08};
   LocateInput input{{{"a", seen_from(rig, 0.05)}}, rig.map, rig.calibration};
   input.roll_pitch_sd_rad = 1.6;
-  const LocateResult found = locate_camera_from_detections(input);
+  const LocateResult found = locate_from_detections(input);
   ASSERT_TRUE(found.rows[0].fix);
   EXPECT_LT(found.rows[0].fix->pose.position_m.norm(), 1e-5);
   EXPECT_NEAR(found.rows[0].fix->inclination->roll_rad, 0.1, 1e-5);

@@ -49,27 +49,21 @@ class MovedLamp : public testing::Test {
     }
   }
 
-  StepResult rotate() const {
-    return run_rotation_calibration_step(rotation, RotationMethod::axis, {});
-  }
+  StepResult rotate() const { return run_rotation_step(rotation, RotationMethod::axis, {}); }
   StepResult disperse() const {
     KnownPositions places;
     for (const Frame& frame : dispersion.frames) {
       places.captures.push_back({frame.detections, {0, 0}});
       places.measured_points.push_back(MeasuredPoint::camera);
     }
-    return run_dispersion_calibration_step(dispersion, places, DispersionMethod::camera,
-                                           DispersionCircle::mean, {});
+    return run_dispersion_step(dispersion, places, DispersionMethod::camera, DispersionCircle::mean,
+                               {});
   }
-  StepResult level() const {
-    return run_tilt_calibration_step({check, map, kFile, camera}, false, {});
-  }
-  StepResult locate() const {
-    return locate_camera_from_detections({check, map, dispersion.calibration});
-  }
+  StepResult level() const { return run_tilt_step({check, map, kFile, camera}, false, {}); }
+  StepResult locate() const { return locate_from_detections({check, map, dispersion.calibration}); }
   StepResult adjust() const {
-    return run_joint_adjustment_step(
-        {{{"check", check, {}}}, map, kFile, camera, "camera.yaml", 1e-3, {}}, {});
+    return run_adjust_step({{{"check", check, {}}}, map, kFile, camera, "camera.yaml", 1e-3, {}},
+                           {});
   }
 
   static constexpr const char* kFile = "lamps.yaml";
@@ -122,15 +116,15 @@ TEST_F(MovedLamp, NoStepWarnsOfLampWhenMapIsCorrect) {
 
 TEST_F(MovedLamp, AdjustmentWarnsOfSetThatIsNoRotationInPlace) {
   take_captures({0, 0});
-  const AdjustStepResult result = run_joint_adjustment_step(
-      {{{"rotation", rotation.frames, {}, true}, {"check", check, {}, true}},
-       map,
-       kFile,
-       camera,
-       "camera.yaml",
-       1e-3,
-       {}},
-      {});
+  const AdjustStepResult result =
+      run_adjust_step({{{"rotation", rotation.frames, {}, true}, {"check", check, {}, true}},
+                       map,
+                       kFile,
+                       camera,
+                       "camera.yaml",
+                       1e-3,
+                       {}},
+                      {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_THAT(result.warnings, Contains(HasSubstr("check is not treated as a rotation in place")));
   EXPECT_THAT(result.warnings, Not(Contains(HasSubstr("rotation is not treated"))));
@@ -138,7 +132,7 @@ TEST_F(MovedLamp, AdjustmentWarnsOfSetThatIsNoRotationInPlace) {
 
 /// Captures of a large room tie few of its lamps together. The captures that fit a mirrored map by
 /// chance must not pass for all.
-TEST(RunTiltCalibrationStep, FailsWithWrongMapForMirroredMapOfLargeRoom) {
+TEST(RunTiltStep, FailsWithWrongMapForMirroredMapOfLargeRoom) {
   constexpr int rows = 10;
   constexpr double distance_m = 1.2, height_m = 2.5, focal_px = 520, noise_px = 0.05;
   LampCaptures input{{}, {}, "lamps.yaml", {}};
@@ -167,9 +161,9 @@ TEST(RunTiltCalibrationStep, FailsWithWrongMapForMirroredMapOfLargeRoom) {
     }
     input.frames.push_back(frame);
   }
-  EXPECT_TRUE(run_tilt_calibration_step(input, false, {}).has_succeeded());
+  EXPECT_TRUE(run_tilt_step(input, false, {}).has_succeeded());
   for (Lamp& lamp : input.lamps.lamps) lamp.position_m.y() *= -1;
-  const TiltResult result = run_tilt_calibration_step(input, false, {});
+  const TiltResult result = run_tilt_step(input, false, {});
   EXPECT_EQ(result.failure, StepFailure::wrong_map) << result.message;
 }
 

@@ -20,17 +20,17 @@ LensResult solve_with_grid(const SplineGrid& grid) {
   const SyntheticViews views = wide_views(false);
   const BoardLattice lattice(views.board);
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
-  input.camera.lens_model = lens_model_for_spline_grid(grid);
+  input.camera.lens_model = splined_lens_model(grid);
   while (input.observations.images.size() < count) {
     const BoardDetection seen = wide_view(views, random, noise_px);
     if (!has_enough_tags(seen, lattice)) continue;
     input.observations.images.push_back(
         observed({std::to_string(input.observations.images.size()) + ".png", kWideImager, seen}));
   }
-  return run_lens_calibration_step(input, {});
+  return run_lens_step(input, {});
 }
 
-TEST(RunLensCalibrationStep, ProposesWiderSplineGridWhenGridIsTooNarrow) {
+TEST(RunLensStep, ProposesWiderSplineGridWhenGridIsTooNarrow) {
   const LensResult result = solve_with_grid({3, 12, 12, 100});
   ASSERT_FALSE(result.has_succeeded());
   EXPECT_THAT(
@@ -42,7 +42,7 @@ TEST(RunLensCalibrationStep, ProposesWiderSplineGridWhenGridIsTooNarrow) {
               HasSubstr(": use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=12_Ny="));
 }
 
-TEST(RunLensCalibrationStep, ProposesSolvableGridWhenGridIsTooWide) {
+TEST(RunLensStep, ProposesSolvableGridWhenGridIsTooWide) {
   constexpr std::size_t count = 12;
   constexpr double noise_px = 0.02;
   Random random(62);
@@ -52,12 +52,12 @@ TEST(RunLensCalibrationStep, ProposesSolvableGridWhenGridIsTooWide) {
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::off};
   while (input.observations.images.size() < count) {
     const BoardDetection seen = views.random_view(random, noise_px);
-    if (!lattice.are_corners_sufficient_for_pose(seen)) continue;
+    if (!lattice.can_determine_pose(seen)) continue;
     input.observations.images.push_back(observed(
         {std::to_string(input.observations.images.size()) + ".png", views.imager_px, seen}));
   }
-  input.camera.lens_model = lens_model_for_spline_grid({3, 10, 10, 350});
-  const LensResult result = run_lens_calibration_step(input, {});
+  input.camera.lens_model = splined_lens_model({3, 10, 10, 350});
+  const LensResult result = run_lens_step(input, {});
   ASSERT_FALSE(result.has_succeeded());
   const std::string take =
       " do not cover the field of view, 5 degrees off axis horizontally and 4 vertically: use "
@@ -68,7 +68,7 @@ TEST(RunLensCalibrationStep, ProposesSolvableGridWhenGridIsTooWide) {
       lens_model_from_name(result.message.substr(result.message.find(take) + take.size()));
   ASSERT_TRUE(model) << result.message;
   input.camera.lens_model = *model;
-  EXPECT_TRUE(run_lens_calibration_step(input, {}).has_succeeded());
+  EXPECT_TRUE(run_lens_step(input, {}).has_succeeded());
 }
 
 }  // namespace

@@ -76,7 +76,7 @@ struct Images {
     add(ids, yaw_rad, lean, map);
   }
 
-  RowTimeCandidates candidates() const { return estimate_row_time_candidates(periods, map); }
+  RowTimeCandidates candidates() const { return list_row_time_candidates(periods, map); }
 
   std::vector<double> costs(bool with_lens = true) const {
     const RowTimeCandidates found = candidates();
@@ -90,10 +90,10 @@ struct Images {
     }
     std::optional<Lens> lens;
     if (with_lens) lens.emplace(calibration.camera.lens_model, calibration.camera.intrinsics);
-    return compute_position_costs_of_row_time_candidates(found, grouped, map, lens);
+    return compute_position_costs(found, grouped, map, lens);
   }
   RowTimeResult chosen(bool with_lens = true) const {
-    return select_row_time_candidate(candidates(), costs(with_lens));
+    return select_row_time(candidates(), costs(with_lens));
   }
   void expect_true_row_time(bool with_lens = true) const {
     ASSERT_EQ(candidates().candidates.size(), 2U);
@@ -110,7 +110,7 @@ struct Images {
   }
 };
 
-TEST(ComputePositionCostsOfRowTimeCandidates, IsNearZeroOnlyForTrueRowTime) {
+TEST(ComputePositionCosts, IsNearZeroOnlyForTrueRowTime) {
   for (const std::vector<int>& seen : {std::vector{2, 3, 4, 5, 6}, {1, 2, 3, 4, 5}}) {
     Images images(mixed_rows());
     for (int k = 0; k < 5; ++k) images.add(seen, k);
@@ -122,14 +122,14 @@ TEST(ComputePositionCostsOfRowTimeCandidates, IsNearZeroOnlyForTrueRowTime) {
   }
 }
 
-TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenOtherMisplacesOnlyOneLamp) {
+TEST(ComputePositionCosts, SelectsTrueRowTimeWhenOtherMisplacesOnlyOneLamp) {
   Images images(two_rows());
   for (int k = 0; k < 5; ++k) images.add({2, 3, 4, 5, 6}, k);
   images.expect_true_row_time(true);
   images.expect_true_row_time(false);
 }
 
-TEST(ComputePositionCostsOfRowTimeCandidates, IsZeroForImagesOfTwoLamps) {
+TEST(ComputePositionCosts, IsZeroForImagesOfTwoLamps) {
   Images images(mixed_rows());
   for (int k = 0; k < 5; ++k) {
     images.add({2, 3}, k);
@@ -139,7 +139,7 @@ TEST(ComputePositionCostsOfRowTimeCandidates, IsZeroForImagesOfTwoLamps) {
   images.expect_undecided();
 }
 
-TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenLampMoved) {
+TEST(ComputePositionCosts, SelectsTrueRowTimeWhenLampMoved) {
   Images images(mixed_rows());
   LampMap moved = images.map;
   moved.lamps[3].position_m += Eigen::Vector3d(0.25, -0.1, 0);
@@ -149,7 +149,7 @@ TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenLampMoved) {
 }
 
 /// Around a circle each assignment is a turn of the other.
-TEST(ComputePositionCostsOfRowTimeCandidates, DoesNotDecideForRotationallySymmetricMap) {
+TEST(ComputePositionCosts, DoesNotDecideForRotationallySymmetricMap) {
   std::vector<Eigen::Vector3d> circle_m;
   for (int i = 0; i < 6; ++i) {
     const double angle_rad = i * std::numbers::pi / 3;
@@ -165,7 +165,7 @@ TEST(ComputePositionCostsOfRowTimeCandidates, DoesNotDecideForRotationallySymmet
 
 /// In a zigzag each assignment is the other's mirror image, moved along: lamps 2 to 5 have the
 /// distances of lamps 1 to 4.
-TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenOtherAssignmentIsMirrored) {
+TEST(ComputePositionCosts, SelectsTrueRowTimeWhenOtherAssignmentIsMirrored) {
   const LampMap zigzag = with_even_ratios(
       {{-0.8, -0.2, 1.6}, {-0.4, 0.2, 1.6}, {0, -0.2, 1.6}, {0.4, 0.2, 1.6}, {0.8, -0.2, 1.6}});
   Images images(zigzag);
@@ -174,7 +174,7 @@ TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenOtherAssignm
   images.expect_true_row_time(false);
 }
 
-TEST(ComputePositionCostsOfRowTimeCandidates, DoesNotDecideForMirroredMap) {
+TEST(ComputePositionCosts, DoesNotDecideForMirroredMap) {
   Images images(mixed_rows());
   LampMap room = images.map;
   for (Lamp& lamp : room.lamps) lamp.position_m.y() *= -1;
@@ -184,7 +184,7 @@ TEST(ComputePositionCostsOfRowTimeCandidates, DoesNotDecideForMirroredMap) {
 }
 
 /// A group that may be either of two lamps takes no part.
-TEST(ComputePositionCostsOfRowTimeCandidates, SelectsTrueRowTimeWhenTwoLampsShareFrequency) {
+TEST(ComputePositionCosts, SelectsTrueRowTimeWhenTwoLampsShareFrequency) {
   LampMap map = mixed_rows();
   map.lamps.push_back({7, {0.3, 0.5, 1.6}, {}, map.lamps[0].frequency_hz, {}});
   Images images(map);

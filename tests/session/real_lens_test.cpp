@@ -31,13 +31,13 @@ LensInput make_input(Observations observations, const std::filesystem::path& boa
 
 /// Returns the largest difference of two lenses where both are known, px.
 double compute_worst_difference_px(const LensEstimate& a, const LensEstimate& b) {
-  const auto difference = compute_projection_difference(
-      a.solution.fitted_lens(), b.solution.fitted_lens(), a.solution.problem.imager_px,
-      [&](const Eigen::Vector2d& pixel) {
-        const bool is_known =
-            polygon_contains(a.report.region, pixel) && polygon_contains(b.report.region, pixel);
-        return is_known ? 1.0 : INFINITY;
-      });
+  const auto difference =
+      compare_projections(a.solution.fitted_lens(), b.solution.fitted_lens(),
+                          a.solution.problem.imager_px, [&](const Eigen::Vector2d& pixel) {
+                            const bool is_known = polygon_contains(a.report.region, pixel) &&
+                                                  polygon_contains(b.report.region, pixel);
+                            return is_known ? 1.0 : INFINITY;
+                          });
   return difference ? difference->worst_px : INFINITY;
 }
 
@@ -53,10 +53,10 @@ TEST(RealWeakViews, StatedErrorCoversDifferenceOfEachPairOfModels) {
     std::vector<LensEstimate> lenses;
     for (const LensModel model : kModels) {
       input.camera.lens_model = model;
-      lenses.push_back(run_lens_calibration_step(input, {}).lens);
+      lenses.push_back(run_lens_step(input, {}).lens);
     }
     input.choose_lens_model = true;
-    lenses.push_back(run_lens_calibration_step(input, {}).lens);
+    lenses.push_back(run_lens_step(input, {}).lens);
     for (const LensEstimate& lens : lenses) {
       ASSERT_TRUE(lens.has_succeeded() && lens.model_uncertainty && lens.intrinsics_covariance);
       const double focal_sd_px = std::sqrt((*lens.intrinsics_covariance)(0, 0));
@@ -94,15 +94,13 @@ TEST(RealFisheye, EveryPixelOfValidRegionHasRay) {
   std::ranges::sort(images);
   ASSERT_EQ(images.size(), 26U);
   const LensEstimate lens =
-      run_lens_calibration_step(
-          make_input(detect_boards_in_images(images, read_board(board), board, {}), board), {})
+      run_lens_step(make_input(detect_boards(images, read_board(board), board, {}), board), {})
           .lens;
   ASSERT_TRUE(lens.has_succeeded()) << lens.problem;
   EXPECT_GE(lens.solution.views.size(), 21U);
   const Lens fitted = lens.solution.fitted_lens();
   const ImageRegion& region = lens.report.region;
-  std::vector<Eigen::Vector2d> pixels =
-      make_regular_pixel_grid(lens.solution.problem.imager_px, 161);
+  std::vector<Eigen::Vector2d> pixels = make_pixel_grid(lens.solution.problem.imager_px, 161);
   std::erase_if(pixels, [&](const auto& pixel) { return !polygon_contains(region, pixel); });
   ASSERT_GT(pixels.size(), 10000U);
   for (std::size_t i = 0; i < region.size(); ++i) {

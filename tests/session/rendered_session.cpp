@@ -57,7 +57,7 @@ class Rendering {
     const Scene scene = read_scene_file(folder_.file("scene.yaml", kScene));
     SimulationOptions options;
     options.folders = folders;
-    render_scene_to_folder(scene, folder_ / "session", options, {});
+    render_scene(scene, folder_ / "session", options, {});
   }
   fs::path file(const std::string& name) const { return folder_ / ("session/" + name); }
 

@@ -48,9 +48,7 @@ class RenderedSession : public testing::Test {
   /// Replaces camera.yaml by images of the board.
   void add_boards_in_place_of_camera() const;
 
-  SessionResult run() const {
-    return run_calibration_session(session_folder, results_folder, options);
-  }
+  SessionResult run() const { return run_session(session_folder, results_folder, options); }
 
   /// Returns the true calibration: camera and tilt.
   static Calibration truth();

@@ -45,10 +45,10 @@ struct RotatingCamera {
     }
   }
   RotationResult calibrate(RotationMethod method = RotationMethod::axis) const {
-    return run_rotation_calibration_step(captures, method, {"", "test", "1.2", "--quick", {}});
+    return run_rotation_step(captures, method, {"", "test", "1.2", "--quick", {}});
   }
   TiltResult calibrate_tilt(bool refine_map = false) const {
-    return run_tilt_calibration_step(captures, refine_map, {});
+    return run_tilt_step(captures, refine_map, {});
   }
 };
 
@@ -56,7 +56,7 @@ double find_metric_or_minus_one(const StepResult& result, const std::string& met
   return find_metric_value(result.metrics, metric).value_or(-1);
 }
 
-TEST(RunRotationCalibrationStep, MetricsAreTiltLeverArmAndResidualsOfExactCaptures) {
+TEST(RunRotationStep, MetricsAreTiltLeverArmAndResidualsOfExactCaptures) {
   RotatingCamera camera;
   for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
   const RotationResult result = camera.calibrate();
@@ -66,7 +66,7 @@ TEST(RunRotationCalibrationStep, MetricsAreTiltLeverArmAndResidualsOfExactCaptur
   EXPECT_NEAR(find_metric_or_minus_one(result, "lever_arm_mm"), std::hypot(9, 4), 1e-5);
   EXPECT_NEAR(find_metric_or_minus_one(result, "rotation_px"), 0, 1e-6);
   const auto& center = result.calibration.rotation_center;
-  const auto covariance = compute_rotation_center_covariance(result.calibration);
+  const auto covariance = compute_center_covariance(result.calibration);
   ASSERT_TRUE(center && covariance);
   EXPECT_NEAR(find_metric_or_minus_one(result, "rotation_sd_px"), std::sqrt(covariance->trace()),
               1e-12);
@@ -77,7 +77,7 @@ TEST(RunRotationCalibrationStep, MetricsAreTiltLeverArmAndResidualsOfExactCaptur
   EXPECT_TRUE(result.drawing);
 }
 
-TEST(RunRotationCalibrationStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
+TEST(RunRotationStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
   RotatingCamera camera;
   for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
   Random random(4);
@@ -92,7 +92,7 @@ TEST(RunRotationCalibrationStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
   EXPECT_THAT(camera.calibrate().warnings, Not(Contains(kNoiseWarning))) << "noise is unknown";
 }
 
-TEST(RunRotationCalibrationStep, WarnsThatLeverArmIsNotEstimatedFromOneHeight) {
+TEST(RunRotationStep, WarnsThatLeverArmIsNotEstimatedFromOneHeight) {
   RotatingCamera camera;
   camera.survey.lever_arm_m.setZero();
   for (Lamp& lamp : camera.survey.truth.map.lamps) lamp.position_m.z() = 1.6;
@@ -113,7 +113,7 @@ TEST(RunRotationCalibrationStep, WarnsThatLeverArmIsNotEstimatedFromOneHeight) {
                                  "mean over 2 heights: use --method axis")));
 }
 
-TEST(RunRotationCalibrationStep, WarnsIfThreeCapturesLeaveNoStandardDeviation) {
+TEST(RunRotationStep, WarnsIfThreeCapturesLeaveNoStandardDeviation) {
   const auto warning = HasSubstr("center has no standard deviation: add captures, four or more");
   for (const int count : {3, 4}) {
     RotatingCamera camera;
@@ -133,7 +133,7 @@ TEST(RunRotationCalibrationStep, WarnsIfThreeCapturesLeaveNoStandardDeviation) {
   }
 }
 
-TEST(RunRotationCalibrationStep, FailsIfCapturesAreNoRotationInPlace) {
+TEST(RunRotationStep, FailsIfCapturesAreNoRotationInPlace) {
   RotatingCamera camera;
   for (int i = 0; i < 8; ++i) camera.survey.stand({{0.1 * i - 0.4, 0.05 * (i % 3), 0}, 0.7 * i});
   camera.rotate(0, 1);
@@ -143,7 +143,7 @@ TEST(RunRotationCalibrationStep, FailsIfCapturesAreNoRotationInPlace) {
   EXPECT_FALSE(result.calibration.rotation_center);
 }
 
-TEST(RunRotationCalibrationStep, DoesNotReportMovedLampForSmallArc) {
+TEST(RunRotationStep, DoesNotReportMovedLampForSmallArc) {
   RotatingCamera camera;
   camera.survey.truth.map.lamps[1].position_m.x() += 0.03;
   camera.rotate(0, 36);
@@ -154,7 +154,7 @@ TEST(RunRotationCalibrationStep, DoesNotReportMovedLampForSmallArc) {
   EXPECT_THAT(result.warnings, Contains(HasSubstr("lamp 2 hangs 30 mm from where the map")));
 }
 
-TEST(RunRotationCalibrationStep, FailsWithWrongMapForMapOfAnotherRoom) {
+TEST(RunRotationStep, FailsWithWrongMapForMapOfAnotherRoom) {
   RotatingCamera camera;
   for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
   std::vector<Lamp>& lamps = camera.captures.lamps.lamps;
@@ -167,7 +167,7 @@ TEST(RunRotationCalibrationStep, FailsWithWrongMapForMapOfAnotherRoom) {
   EXPECT_EQ(result.file_to_correct, "lamps.yaml");
 }
 
-TEST(RunRotationCalibrationStep, WarnsOfRejectedCaptures) {
+TEST(RunRotationStep, WarnsOfRejectedCaptures) {
   RotatingCamera camera;
   for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
   camera.captures.frames.push_back({"one lamp", camera.captures.frames[0].detections});
@@ -177,7 +177,7 @@ TEST(RunRotationCalibrationStep, WarnsOfRejectedCaptures) {
   EXPECT_THAT(result.warnings, ElementsAre(testing::StartsWith("one lamp: rejected: ")));
 }
 
-TEST(RunTiltCalibrationStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
+TEST(RunTiltStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
   RotatingCamera camera;
   for (int i = 0; i < 12; ++i) camera.survey.stand({{0.05 * i - 0.3, 0.04 * (i % 3), 0}, 0.7 * i});
   camera.rotate(0, 1);
@@ -200,7 +200,7 @@ TEST(RunTiltCalibrationStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
   EXPECT_THAT(refined.warnings, Not(Contains(HasSubstr("--refine-map"))));
 }
 
-TEST(RunTiltCalibrationStep, RequiresRowTimeOnlyForMovingCamera) {
+TEST(RunTiltStep, RequiresRowTimeOnlyForMovingCamera) {
   RotatingCamera camera;
   for (int i = 0; i < 12; ++i) camera.survey.stand({{0.05 * i - 0.3, 0.04 * (i % 3), 0}, 0.7 * i});
   camera.rotate(0, 1);
@@ -210,7 +210,7 @@ TEST(RunTiltCalibrationStep, RequiresRowTimeOnlyForMovingCamera) {
   EXPECT_THROW(camera.calibrate_tilt(), std::invalid_argument);
 }
 
-TEST(RunTiltCalibrationStep, FindsMovedLampOnlyFromCapturesAtRest) {
+TEST(RunTiltStep, FindsMovedLampOnlyFromCapturesAtRest) {
   RotatingCamera camera;
   camera.survey.truth.map.lamps[1].position_m.x() += 0.03;
   for (int i = 0; i < 40; ++i) {
@@ -234,7 +234,7 @@ TEST(RunTiltCalibrationStep, FindsMovedLampOnlyFromCapturesAtRest) {
   EXPECT_EQ(result.failure, StepFailure::wrong_map) << "an error of the map as a whole";
 }
 
-TEST(RunTiltCalibrationStep, ReturnsUndeterminedForCapturesOfSingleLamp) {
+TEST(RunTiltStep, ReturnsUndeterminedForCapturesOfSingleLamp) {
   RotatingCamera camera;
   camera.rotate(0, 8);
   for (Frame& frame : camera.captures.frames) frame.detections.resize(1);

@@ -52,11 +52,10 @@ Observation observe(const LampMap& map, const std::vector<double>& deviations, b
   return image;
 }
 
-TEST(CheckRowTimeAgainstLamps, ReportsMeasuredRowTimeWhenGivenIs5PercentOff) {
+TEST(CheckRowTime, ReportsMeasuredRowTimeWhenGivenIs5PercentOff) {
   const LampMap map = make_map();
   const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, true));
-  const RowTimeCheck check =
-      check_row_time_against_lamps(images, map, {1.9e-5, "camera_type.yaml"});
+  const RowTimeCheck check = check_row_time(images, map, {1.9e-5, "camera_type.yaml"});
   ASSERT_TRUE(check.measured);
   EXPECT_EQ(check.measured->lamps, 5);
   EXPECT_NEAR(check.measured->row_time_s, kTrueRowTime_s, 1e-9);
@@ -71,28 +70,27 @@ TEST(CheckRowTimeAgainstLamps, ReportsMeasuredRowTimeWhenGivenIs5PercentOff) {
   EXPECT_NEAR(*find_metric_value(metrics, "row_time_error_percent"), 5, 0.2);
 }
 
-TEST(CheckRowTimeAgainstLamps, MeasuresNoRowTimeFromTwoLamps) {
+TEST(CheckRowTime, MeasuresNoRowTimeFromTwoLamps) {
   LampMap map = make_map();
   map.lamps.resize(2);
   const std::vector<Observation> images(4, observe(map, {0, 0}, true));
-  const RowTimeCheck check =
-      check_row_time_against_lamps(images, map, {1.9e-5, "camera_type.yaml"});
+  const RowTimeCheck check = check_row_time(images, map, {1.9e-5, "camera_type.yaml"});
   EXPECT_FALSE(check.measured);
   EXPECT_EQ(check.error, "");
 }
 
-TEST(DescribeAlternativeRowTime, NamesWrongRowTimeWithWhichNoLampIsIdentified) {
+TEST(DescribeOtherRowTime, NamesWrongRowTimeWithWhichNoLampIsIdentified) {
   const LampMap map = make_map();
   const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, false));
-  EXPECT_THAT(describe_alternative_row_time(images, map, std::nullopt, {2.2e-5, "camera.yaml"}),
+  EXPECT_THAT(describe_other_row_time(images, map, std::nullopt, {2.2e-5, "camera.yaml"}),
               HasSubstr("row time is 22 us in camera.yaml, but the stripes of 5 lamps measure"));
-  EXPECT_EQ(describe_alternative_row_time(images, map, std::nullopt, {2e-5, "camera.yaml"}), "");
-  EXPECT_EQ(describe_alternative_row_time({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
+  EXPECT_EQ(describe_other_row_time(images, map, std::nullopt, {2e-5, "camera.yaml"}), "");
+  EXPECT_EQ(describe_other_row_time({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
 }
 
 /// Periods of lamps 2 to 6 of a map whose frequencies have the ratio 1.2 fit two row times. The
 /// lights are at the positions of the lamps for one of them. There are two folders.
-TEST(SelectRowTimeByPeriodsAndPositions, DecidesAmbiguousPeriodsByPositions) {
+TEST(EstimateRowTime, DecidesAmbiguousPeriodsByPositions) {
   LampMap map;
   for (int id = 1; id <= 6; ++id) {
     Lamp lamp{};
@@ -118,8 +116,7 @@ TEST(SelectRowTimeByPeriodsAndPositions, DecidesAmbiguousPeriodsByPositions) {
     if (is_repeated) image.lights.insert(image.lights.end(), lights.begin(), lights.end());
     const std::vector<Observation> images(5, image);
     const std::span all(images);
-    return select_row_time_by_periods_and_positions(std::array{all.first(2), all.last(3)}, {{}, {}},
-                                                    map, lens);
+    return estimate_row_time(std::array{all.first(2), all.last(3)}, {{}, {}}, map, lens);
   };
   const RowTimeResult decided = select(false);
   ASSERT_TRUE(decided.row_time) << decided.problem;
@@ -129,12 +126,12 @@ TEST(SelectRowTimeByPeriodsAndPositions, DecidesAmbiguousPeriodsByPositions) {
   EXPECT_THAT(undecided.problem, HasSubstr("neither duties nor positions of the lamps decide"));
 }
 
-TEST(AddRowTimeContradictionToResult, WarnsOrReplacesReasonOfFailure) {
+TEST(AddRowTimeRemark, WarnsOrReplacesReasonOfFailure) {
   const LampMap map = make_map();
   const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, true));
   DetectorCamera camera;
   const auto add_to = [&](StepResult result) {
-    add_row_time_contradiction_to_result(images, map, camera, "camera.yaml", result);
+    add_row_time_remark(images, map, camera, "camera.yaml", result);
     return result;
   };
   StepResult failed;
@@ -150,9 +147,9 @@ TEST(AddRowTimeContradictionToResult, WarnsOrReplacesReasonOfFailure) {
   EXPECT_THAT(add_to(failed).message, StartsWith("row time is 22 us in camera.yaml"));
 }
 
-TEST(DescribeRowTimeContradiction, AllowsLampDriftPlusThreeStandardDeviations) {
+TEST(DescribeWrongRowTime, AllowsLampDriftPlusThreeStandardDeviations) {
   const auto describe = [](double measured_s, double sd_s, int lamps) {
-    return describe_row_time_contradiction({measured_s, sd_s, lamps, lamps}, {2e-5, "camera.yaml"});
+    return describe_wrong_row_time({measured_s, sd_s, lamps, lamps}, {2e-5, "camera.yaml"});
   };
   const double limit_s = 2e-5 * std::exp(kLampDrift);
   EXPECT_EQ(describe(0.999 * limit_s, 0, 3), "");
@@ -168,7 +165,7 @@ TEST(DescribeRowTimeContradiction, AllowsLampDriftPlusThreeStandardDeviations) {
       "");
 }
 
-TEST(EstimateRowTimeFromLights, ReplacesHistoryOfEarlierSearch) {
+TEST(RunRowTimeStep, ReplacesHistoryOfEarlierSearch) {
   const LampMap map = make_map();
   DetectedLights seen;
   seen.observations.images.assign(4, observe(map, {0, 0, 0, 0, 0}, false));
@@ -178,8 +175,8 @@ TEST(EstimateRowTimeFromLights, ReplacesHistoryOfEarlierSearch) {
                          {"camera", "test", "1", "--row-time", {}},
                          {"camera", "test", "1", "--lens auto", {}},
                          {"rotation_center", "test", "1", "--row-time", {}}};
-  const RowTimeStepResult result = estimate_row_time_from_lights(
-      seen, {{}}, map, "lamps.yaml", calibration, {"", "test", "2", "--row-time", {}});
+  const RowTimeStepResult result = run_row_time_step(seen, {{}}, map, "lamps.yaml", calibration,
+                                                     {"", "test", "2", "--row-time", {}});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   std::vector<std::string> kept;
   for (const HistoryEntry& entry : result.calibration.history) {
@@ -190,18 +187,18 @@ TEST(EstimateRowTimeFromLights, ReplacesHistoryOfEarlierSearch) {
                                  "rotation_center test 1 --row-time", "camera test 2 --row-time"));
 }
 
-TEST(EstimateRowTimeFromLights, IsUndeterminedWithoutLights) {
+TEST(RunRowTimeStep, IsUndeterminedWithoutLights) {
   DetectedLights seen;
   seen.observations.images.resize(2);
   seen.folder_sizes = {1, 1};
   const RowTimeStepResult result =
-      estimate_row_time_from_lights(seen, {{}, {}}, make_map(), "lamps.yaml", std::nullopt, {});
+      run_row_time_step(seen, {{}, {}}, make_map(), "lamps.yaml", std::nullopt, {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_FALSE(result.message.empty());
   EXPECT_TRUE(result.metrics.empty());
 }
 
-TEST(EstimateRowTimeFromLights, StoresRowTimeAndReadoutInCalibration) {
+TEST(RunRowTimeStep, StoresRowTimeAndReadoutInCalibration) {
   const LampMap map = make_map();
   DetectedLights seen;
   seen.observations.images.assign(4, observe(map, {0, 0, 0, 0, 0}, false));
@@ -210,7 +207,7 @@ TEST(EstimateRowTimeFromLights, StoresRowTimeAndReadoutInCalibration) {
   Calibration calibration = read_calibration(kRig + "/true_calibration.yaml");
   calibration.camera.row_time_s = 2.2e-5;
   const auto estimate = [&](const std::optional<Calibration>& given) {
-    return estimate_row_time_from_lights(seen, {{}}, map, "lamps.yaml", given, {});
+    return run_row_time_step(seen, {{}}, map, "lamps.yaml", given, {});
   };
   const RowTimeStepResult stored = estimate(calibration);
   ASSERT_TRUE(stored.has_succeeded()) << stored.message;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// run_calibration_session(): sessions whose lens is estimated from images of a board.
+/// run_session(): sessions whose lens is estimated from images of a board.
 #include <gmock/gmock.h>
 
 #include "captures/digest.h"
@@ -35,7 +35,7 @@ class RunCalibrationSessionWithBoards : public RenderedSession {
 std::vector<std::string> list_gate_names(const std::vector<CheckedMetric>& gates) {
   std::vector<std::string> names;
   for (const CheckedMetric& gate : gates) {
-    if (make_default_step_gates({{gate.name, 0}}).empty()) names.push_back(gate.name);
+    if (make_step_gates({{gate.name, 0}}).empty()) names.push_back(gate.name);
   }
   return names;
 }
@@ -66,7 +66,7 @@ TEST_F(RunCalibrationSessionWithBoards, EstimatesLensWithNameModelAndRowTimeOfOp
             "--max-white-fraction 0.5 --lens LENSMODEL_OPENCV4");
   ASSERT_EQ(lens.history[0].inputs.size(), 2U);
   EXPECT_EQ(lens.history[0].inputs[0].file, "board.yaml");
-  EXPECT_EQ(lens.history[0].inputs[0].sha256, compute_file_sha256(session_file("board.yaml")));
+  EXPECT_EQ(lens.history[0].inputs[0].sha256, hash_file(session_file("board.yaml")));
   EXPECT_EQ(lens.history[0].inputs[1].file, "boards");
   EXPECT_THAT(find_step(result, "rotation").result.notes, IsEmpty()) << "the readout is stated";
   EXPECT_TRUE(find_metric_value(find_step(result, "rotation").result.metrics, "row_time_us"));

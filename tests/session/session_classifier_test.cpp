@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// run_calibration_session(): sessions whose lamps are identified by a classifier.
+/// run_session(): sessions whose lamps are identified by a classifier.
 #include <gmock/gmock.h>
 
 #include <stdexcept>
@@ -29,11 +29,11 @@ class RunCalibrationSessionWithClassifier : public RenderedSession {
     FrontendOptions frontend;
     frontend.readout = Readout::rows;
     const fs::path rotation = session_file("rotation");
-    const DetectedLights seen = detect_lights_in_folders({rotation}, lamps, {}, false, frontend);
+    const DetectedLights seen = detect_in_folders({rotation}, lamps, {}, false, frontend);
     const auto labels = read_detections(rotation / "true_detections.csv");
-    const TrainStepResult trained = train_lamp_classifier(seen, {labels}, lamps, rotation);
+    const TrainStepResult trained = run_train_step(seen, {labels}, lamps, rotation);
     ASSERT_TRUE(trained.has_succeeded()) << trained.message;
-    write_lamp_classifier(session_file("classifier.yaml"), trained.classifier);
+    write_classifier(session_file("classifier.yaml"), trained.classifier);
     std::string map = TemporaryFolder::read_content(session_file("lamps.yaml"));
     for (auto at = map.find(", frequency_hz"); at != std::string::npos;
          at = map.find(", frequency_hz")) {

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// run_calibration_session(): steps that fail, and sessions and options that it rejects.
+/// run_session(): steps that fail, and sessions and options that it rejects.
 #include <fmt/core.h>
 #include <gmock/gmock.h>
 
@@ -16,7 +16,7 @@ namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
-using RunCalibrationSession = RenderedSession;
+using RunSession = RenderedSession;
 using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -183,10 +183,10 @@ const SessionFault kFaults[] = {
        }
      }}};
 
-INSTANTIATE_TEST_SUITE_P(RunCalibrationSession, FaultySession, testing::ValuesIn(kFaults),
+INSTANTIATE_TEST_SUITE_P(RunSession, FaultySession, testing::ValuesIn(kFaults),
                          [](const auto& instance) { return instance.param.name; });
 
-TEST_F(RunCalibrationSession, WarnsOfRowTimeThatFailsGate) {
+TEST_F(RunSession, WarnsOfRowTimeThatFailsGate) {
   write_camera(3.1e-5);
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::fail);
@@ -198,7 +198,7 @@ TEST_F(RunCalibrationSession, WarnsOfRowTimeThatFailsGate) {
   }
 }
 
-TEST_F(RunCalibrationSession, RemovesPathOfSessionOnlyAtBeginningOfFileName) {
+TEST_F(RunSession, RemovesPathOfSessionOnlyAtBeginningOfFileName) {
   fs::remove(session_file("dispersion/truth.csv"));
   const std::string path = session_file("a.png").string();
   write_session_file("dispersion/captures.csv", "image,x_m,y_m\n0000.png," + path + ",1\n");
@@ -207,7 +207,7 @@ TEST_F(RunCalibrationSession, RemovesPathOfSessionOnlyAtBeginningOfFileName) {
   EXPECT_THAT(run().reason, testing::EndsWith("should be a finite number, not 'x" + path + "'"));
 }
 
-TEST_F(RunCalibrationSession, IncompleteSessionHasNoResultAndNoOutputs) {
+TEST_F(RunSession, IncompleteSessionHasNoResultAndNoOutputs) {
   run();
   fs::remove(session_file("lamps.yaml"));
   const SessionResult result = run();
@@ -224,7 +224,7 @@ TEST_F(RunCalibrationSession, IncompleteSessionHasNoResultAndNoOutputs) {
   EXPECT_THAT(read_result("junit.xml"), HasSubstr("lamps.yaml: is missing"));
 }
 
-TEST_F(RunCalibrationSession, InvalidGatesOfSessionRemoveOnlyEvaluation) {
+TEST_F(RunSession, InvalidGatesOfSessionRemoveOnlyEvaluation) {
   run();
   write_session_file("gates.yaml", std::string(kGates) + "  odd_mm: 1\n");
   const SessionResult result = run();
@@ -239,7 +239,7 @@ TEST_F(RunCalibrationSession, InvalidGatesOfSessionRemoveOnlyEvaluation) {
   EXPECT_THAT(list_executed_steps(run()), ElementsAre("evaluate"));
 }
 
-TEST_F(RunCalibrationSession, RejectsInvalidGatesFileOfOptionsBeforeFirstStep) {
+TEST_F(RunSession, RejectsInvalidGatesFileOfOptionsBeforeFirstStep) {
   options.gates_file = folder.file("gates.yaml", std::string(kGates) + "  odd_mm: 1\n");
   EXPECT_THAT([&] { run(); }, ThrowsMessage<InputError>(HasSubstr("gates.yaml:3: ")));
   EXPECT_FALSE(fs::exists(results_folder));
@@ -248,10 +248,10 @@ TEST_F(RunCalibrationSession, RejectsInvalidGatesFileOfOptionsBeforeFirstStep) {
       << "even if the session has gates of its own";
 }
 
-TEST_F(RunCalibrationSession, RejectsMissingFolderCapturesAsResultsAndResultsOfAnotherSession) {
+TEST_F(RunSession, RejectsMissingFolderCapturesAsResultsAndResultsOfAnotherSession) {
   const auto expect_rejected = [&](const fs::path& session, const fs::path& results,
                                    const std::string& message) {
-    EXPECT_THAT([&] { run_calibration_session(session, results, options); },
+    EXPECT_THAT([&] { run_session(session, results, options); },
                 ThrowsMessage<InputError>(HasSubstr(message)));
   };
   expect_rejected(folder / "none", results_folder, "none: is not a folder of captures");

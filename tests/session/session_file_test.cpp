@@ -80,11 +80,11 @@ TEST(ReadStepRecord, ReturnsNulloptForMissingOrTruncatedFileOrOtherVersion) {
   EXPECT_FALSE(read_step_record(folder.file("other.json", other)));
 }
 
-TEST(FormatSessionJson, ContainsLensSdsOnlyWithLensCovariance) {
+TEST(FormatSession, ContainsLensSdsOnlyWithLensCovariance) {
   SessionResult result;
   result.calibration = Calibration{synthetic_camera(), {}, {}, {}, {}};
   const auto format_calibration = [&] {
-    return nlohmann::json::parse(format_session_json(result, {}))["calibration"];
+    return nlohmann::json::parse(format_session(result, {}))["calibration"];
   };
   EXPECT_EQ(format_calibration()["focal_px"][0], synthetic_camera().focal_px().x());
   EXPECT_EQ(format_calibration()["principal_point_px"][1],
@@ -101,7 +101,7 @@ TEST(FormatSessionJson, ContainsLensSdsOnlyWithLensCovariance) {
   EXPECT_EQ(format_calibration()["principal_point_sd_px"], nlohmann::json({3, 4}));
 }
 
-TEST(FormatSessionJson, StatesRotationCenterAndDispersionInMillimetersAndDegrees) {
+TEST(FormatSession, StatesRotationCenterAndDispersionInMillimetersAndDegrees) {
   SessionResult result;
   Calibration& calibration =
       result.calibration.emplace(Calibration{synthetic_camera(), {}, {}, {}, {}});
@@ -111,7 +111,7 @@ TEST(FormatSessionJson, StatesRotationCenterAndDispersionInMillimetersAndDegrees
   append_parameters(calibration.covariance.emplace(), list_pair_names(kLeverArmParameter),
                     MatrixX(2, 0), Eigen::Vector2d(1e-8, 4e-8).asDiagonal().toDenseMatrix());
   calibration.dispersion = Dispersion{{0.4, -0.3}, 0.001, {0, 0}, 12};
-  const auto json = nlohmann::json::parse(format_session_json(result, {}))["calibration"];
+  const auto json = nlohmann::json::parse(format_session(result, {}))["calibration"];
   EXPECT_NEAR(json.at("tilt_deg"), deg_from_rad(tilt_rad), 1e-9);
   EXPECT_NEAR(json.at("tilt_azimuth_deg"), deg_from_rad(azimuth_rad), 1e-9);
   EXPECT_NEAR(json.at("lever_arm_mm")[0], 2, 1e-12);
@@ -121,7 +121,7 @@ TEST(FormatSessionJson, StatesRotationCenterAndDispersionInMillimetersAndDegrees
   EXPECT_EQ(json.at("dispersion_offset_px"), nlohmann::json({0.4, -0.3}));
 }
 
-TEST(FormatSessionJson, StatesStandardDeviationsOfZenithAndOffset) {
+TEST(FormatSession, StatesStandardDeviationsOfZenithAndOffset) {
   SessionResult result;
   Calibration& calibration =
       result.calibration.emplace(Calibration{synthetic_camera(), {}, {}, {}, {}});
@@ -129,7 +129,7 @@ TEST(FormatSessionJson, StatesStandardDeviationsOfZenithAndOffset) {
   calibration.rotation_center = tilted_by(calibration.camera, 0.02, 0);
   calibration.dispersion = Dispersion{{0.4, -0.3}, 0.001, {0, 0}, 12};
   const auto format_calibration = [&] {
-    return nlohmann::json::parse(format_session_json(result, {}))["calibration"];
+    return nlohmann::json::parse(format_session(result, {}))["calibration"];
   };
   for (const char* key : {"rotation_center_sd_px", "zenith_sd_deg", "dispersion_offset_sd_px"}) {
     EXPECT_TRUE(format_calibration().at(key).is_null()) << key;
@@ -179,11 +179,11 @@ SessionResult make_session_result() {
   return result;
 }
 
-TEST(FormatSessionJson, ListsMetricsWithStepUnitAndGate) {
+TEST(FormatSession, ListsMetricsWithStepUnitAndGate) {
   SessionOptions options;
   options.camera_id = "unit-8";
   options.program = {"vlp-calibrate", "1.2"};
-  const auto json = nlohmann::json::parse(format_session_json(make_session_result(), options));
+  const auto json = nlohmann::json::parse(format_session(make_session_result(), options));
   EXPECT_EQ(json["verdict"], "gate");
   EXPECT_EQ(json["reason"], "tilt_deg is 0.9");
   EXPECT_EQ(json["camera"], "unit-8") << "without a calibration";
@@ -205,8 +205,8 @@ TEST(FormatSessionJson, ListsMetricsWithStepUnitAndGate) {
               "limit": 0.5, "direction": "at most", "passed": false})"));
 }
 
-TEST(FormatSessionJson, ListsStepsWithTheirRemarksOnly) {
-  const auto json = nlohmann::json::parse(format_session_json(make_session_result(), {}));
+TEST(FormatSession, ListsStepsWithTheirRemarksOnly) {
+  const auto json = nlohmann::json::parse(format_session(make_session_result(), {}));
   ASSERT_EQ(json["steps"].size(), 2U);
   EXPECT_EQ(json["steps"][0], nlohmann::json::parse(R"({"name": "lens", "failure": "none"})"));
   EXPECT_EQ(json["steps"][1]["warnings"], nlohmann::json({"a warning"}));
@@ -221,36 +221,36 @@ TEST(FormatSessionJson, ListsStepsWithTheirRemarksOnly) {
   EXPECT_FALSE(json["steps"][1].contains("message"));
 }
 
-TEST(FormatSessionJson, ContainsHistoryOfCalibration) {
+TEST(FormatSession, ContainsHistoryOfCalibration) {
   SessionResult result;
   result.calibration = Calibration{synthetic_camera(), {}, {}, {}, {}};
   result.calibration->history = {
       {"camera", "vlp-calibrate", "1.2", "--lens auto", {{"boards", "abc"}, {"board.yaml", "d"}}}};
-  const auto json = nlohmann::json::parse(format_session_json(result, {}));
+  const auto json = nlohmann::json::parse(format_session(result, {}));
   EXPECT_EQ(json["history"],
             nlohmann::json::parse(R"([{"part": "camera", "program": "vlp-calibrate",
               "version": "1.2", "options": "--lens auto", "inputs": [
                 {"file": "boards", "sha256": "abc"}, {"file": "board.yaml", "sha256": "d"}]}])"));
 }
 
-TEST(FormatSessionJunitXml, ListsStepsAndGates) {
+TEST(FormatSessionJunit, ListsStepsAndGates) {
   SessionResult result = make_session_result();
-  const std::string text = format_session_junit_xml(result);
+  const std::string text = format_session_junit(result);
   EXPECT_THAT(text, testing::HasSubstr("tests=\"4\""));
   EXPECT_THAT(text, testing::HasSubstr("a warning"));
   EXPECT_THAT(text, testing::HasSubstr("<failure"));
   EXPECT_THAT(text, testing::Not(testing::HasSubstr("<error")));
   result.steps[1].result.set_step_failure(StepFailure::undetermined, "too few captures");
-  EXPECT_THAT(format_session_junit_xml(result),
+  EXPECT_THAT(format_session_junit(result),
               testing::HasSubstr("<error type=\"undetermined\" message=\"too few captures"));
 }
 
-TEST(FormatSessionJunitXml, StatesReasonIfThereIsNoStep) {
+TEST(FormatSessionJunit, StatesReasonIfThereIsNoStep) {
   SessionResult result;
   result.verdict = Verdict::invalid;
   result.failure = StepFailure::bad_input;
   result.reason = "lamps.yaml: is missing";
-  const std::string text = format_session_junit_xml(result);
+  const std::string text = format_session_junit(result);
   EXPECT_THAT(text, testing::HasSubstr("tests=\"1\""));
   EXPECT_THAT(text,
               testing::HasSubstr("<error type=\"bad_input\" message=\"lamps.yaml: is missing"));

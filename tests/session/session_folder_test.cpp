@@ -67,8 +67,8 @@ TEST(SessionFolder, ConstructorNamesMissingFileOrFolder) {
   EXPECT_THAT(refusal(), HasSubstr("unit/board.yaml: is missing"));
   folder.file("unit/camera.yaml", "\n");
   const SessionFolder known(folder / "unit");
-  EXPECT_TRUE(known.camera_calibration_file());
-  EXPECT_FALSE(known.accuracy_check_captures_folder());
+  EXPECT_TRUE(known.camera_calibration_path());
+  EXPECT_FALSE(known.accuracy_check_folder());
 }
 
 TEST(SessionFolder, FoldersOfDrivesAlongLinesAreThoseWithPositions) {
@@ -85,14 +85,14 @@ TEST(SessionFolder, FoldersOfDrivesAlongLinesAreThoseWithPositions) {
   ASSERT_THAT(lines, SizeIs(2));
   EXPECT_EQ(lines[0].filename(), "line-x");
   EXPECT_EQ(lines[1].filename(), "line-y");
-  EXPECT_TRUE(is_session_or_captures_folder(folder / "unit", folder / "unit"));
+  EXPECT_TRUE(is_session_folder(folder / "unit", folder / "unit"));
   for (const char* name : {"boards", "rotation", "dispersion", "check", "line-x"}) {
     fs::create_directories(folder / "unit" / name);
-    EXPECT_TRUE(is_session_or_captures_folder(folder / "unit", folder / "unit" / name)) << name;
+    EXPECT_TRUE(is_session_folder(folder / "unit", folder / "unit" / name)) << name;
   }
-  EXPECT_FALSE(is_session_or_captures_folder(folder / "unit", folder / "unit/results"));
+  EXPECT_FALSE(is_session_folder(folder / "unit", folder / "unit/results"));
   fs::create_directories(folder / "unit/results");
-  EXPECT_FALSE(is_session_or_captures_folder(folder / "unit", folder / "unit/results"));
+  EXPECT_FALSE(is_session_folder(folder / "unit", folder / "unit/results"));
 }
 
 }  // namespace

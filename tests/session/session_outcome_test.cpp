@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// run_calibration_session(): gates, warnings, metrics and history.
+/// run_session(): gates, warnings, metrics and history.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -14,7 +14,7 @@ namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
-using RunCalibrationSession = RenderedSession;
+using RunSession = RenderedSession;
 using testing::AllOf;
 using testing::Contains;
 using testing::ElementsAre;
@@ -29,7 +29,7 @@ std::string format_gates(const std::string& gates) {
 
 /// Returns true for a default gate that is met.
 bool is_usual(const CheckedMetric& gate) {
-  return gate.has_passed_gate() && !make_default_step_gates({{gate.name, 0}}).empty();
+  return gate.has_passed_gate() && !make_step_gates({{gate.name, 0}}).empty();
 }
 
 /// Returns the names of gates, without default ones that are met; "!" before those that failed.
@@ -41,7 +41,7 @@ std::vector<std::string> list_gates(const std::vector<CheckedMetric>& gates) {
   return names;
 }
 
-TEST_F(RunCalibrationSession, ChecksDefaultGatesOfEachStepForGivenCamera) {
+TEST_F(RunSession, ChecksDefaultGatesOfEachStepForGivenCamera) {
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
   EXPECT_EQ(std::ranges::count_if(result.gates, is_usual), 2);
@@ -50,17 +50,15 @@ TEST_F(RunCalibrationSession, ChecksDefaultGatesOfEachStepForGivenCamera) {
   EXPECT_THAT(list_gates(run().gates), ElementsAre("!normalized_error_rms"));
 }
 
-TEST(MakeDefaultStepGates, LimitsYawErrorsAboveFiveDegrees) {
-  const auto gates =
-      make_default_step_gates({{"yaw_rms_deg", 4.9}, {"normalized_yaw_error_rms", 99}});
+TEST(MakeStepGates, LimitsYawErrorsAboveFiveDegrees) {
+  const auto gates = make_step_gates({{"yaw_rms_deg", 4.9}, {"normalized_yaw_error_rms", 99}});
   EXPECT_THAT(gates, IsEmpty()) << "a heading that is set by hand";
-  const auto found =
-      make_default_step_gates({{"yaw_rms_deg", 5.1}, {"normalized_yaw_error_rms", 99}});
+  const auto found = make_step_gates({{"yaw_rms_deg", 5.1}, {"normalized_yaw_error_rms", 99}});
   ASSERT_EQ(found.size(), 1U);
   EXPECT_EQ(found[0].metric, "normalized_yaw_error_rms");
 }
 
-TEST_F(RunCalibrationSession, StrictFailsForEachWarning) {
+TEST_F(RunSession, StrictFailsForEachWarning) {
   options.camera_id = "another";  // than that of camera.yaml, which warns
   EXPECT_EQ(run().verdict, Verdict::pass);
   options.strict = true;
@@ -70,7 +68,7 @@ TEST_F(RunCalibrationSession, StrictFailsForEachWarning) {
   EXPECT_EQ(result.reason, "warnings is 1, at most 0 is required");
 }
 
-TEST_F(RunCalibrationSession, ChecksGatesInOrderOfSteps) {
+TEST_F(RunSession, ChecksGatesInOrderOfSteps) {
   write_session_file("gates.yaml",
                      format_gates("mean_mm: 1, dispersion_mm: 1, tilt_deg: 1, rotation_px: 1"));
   const SessionResult result = run();
@@ -85,7 +83,7 @@ TEST_F(RunCalibrationSession, ChecksGatesInOrderOfSteps) {
   EXPECT_THAT(find_step(result, "check").result.gates, IsEmpty());
 }
 
-TEST_F(RunCalibrationSession, FailedGatesAreTheReasonOfVerdict) {
+TEST_F(RunSession, FailedGatesAreTheReasonOfVerdict) {
   options.report = true;
   write_session_file("gates.yaml", format_gates("mean_mm: 1.0e-6, tilt_deg: 0.5, rotation_px: 1"));
   const SessionResult result = run();
@@ -107,7 +105,7 @@ TEST_F(RunCalibrationSession, FailedGatesAreTheReasonOfVerdict) {
   EXPECT_EQ(again.verdict, Verdict::fail);
 }
 
-TEST_F(RunCalibrationSession, ChangedGateRunsOnlyEvaluationAgain) {
+TEST_F(RunSession, ChangedGateRunsOnlyEvaluationAgain) {
   write_session_file("gates.yaml", format_gates("tilt_deg: 0.5"));
   run();
   for (const char* gates : {"tilt_deg: 2", "rotation_px: 2", "rotation_px: 2, mean_mm: 1"}) {
@@ -118,14 +116,14 @@ TEST_F(RunCalibrationSession, ChangedGateRunsOnlyEvaluationAgain) {
   }
 }
 
-TEST_F(RunCalibrationSession, GatesFileOfOptionsAppliesOnlyToSessionWithoutGates) {
+TEST_F(RunSession, GatesFileOfOptionsAppliesOnlyToSessionWithoutGates) {
   options.gates_file = folder.file("gates.yaml", format_gates("tilt_deg: 0.5"));
   EXPECT_THAT(list_gates(run().gates), ElementsAre("!tilt_deg"));
   write_session_file("gates.yaml", format_gates("rotation_px: 1"));
   EXPECT_THAT(list_gates(run().gates), ElementsAre("rotation_px"));
 }
 
-TEST_F(RunCalibrationSession, GatesOfMissingStepsFail) {
+TEST_F(RunSession, GatesOfMissingStepsFail) {
   write_session_file("gates.yaml", format_gates("views: 6, dispersion_mm: 1, mean_mm: 1"));
   fs::remove_all(session_file("dispersion"));
   fs::remove_all(session_file("check"));
@@ -138,7 +136,7 @@ TEST_F(RunCalibrationSession, GatesOfMissingStepsFail) {
   EXPECT_EQ(find_step(result, "lens").result.gates.size(), 1U);
 }
 
-TEST_F(RunCalibrationSession, DoesNotCheckGatesOfFailedStep) {
+TEST_F(RunSession, DoesNotCheckGatesOfFailedStep) {
   write_session_file("gates.yaml", format_gates("tilt_deg: 0.5, views: 6"));
   keep_captures("rotation", 2);
   const SessionResult result = run();
@@ -147,7 +145,7 @@ TEST_F(RunCalibrationSession, DoesNotCheckGatesOfFailedStep) {
   EXPECT_THAT(result.reason, StartsWith("rotation: "));
 }
 
-TEST_F(RunCalibrationSession, EvaluateStatesWhyThereIsNoReport) {
+TEST_F(RunSession, EvaluateStatesWhyThereIsNoReport) {
   options.report = true;
   fs::remove(session_file("check/truth.csv"));
   const SessionResult without_places = run();
@@ -172,7 +170,7 @@ TEST_F(RunCalibrationSession, EvaluateStatesWhyThereIsNoReport) {
   }
 }
 
-TEST_F(RunCalibrationSession, GivenCameraTakesPrecedenceOverOptions) {
+TEST_F(RunSession, GivenCameraTakesPrecedenceOverOptions) {
   const SessionOptions defaults = options;
   for (const auto& [set, ignored] :
        {std::pair(
@@ -200,7 +198,7 @@ TEST_F(RunCalibrationSession, GivenCameraTakesPrecedenceOverOptions) {
   }
 }
 
-TEST_F(RunCalibrationSession, IgnoresReadoutOptionIfRowTimeIsEstimated) {
+TEST_F(RunSession, IgnoresReadoutOptionIfRowTimeIsEstimated) {
   write_camera(std::nullopt);
   options.frontend.readout = Readout::columns;
   const SessionResult result = run();
@@ -209,7 +207,7 @@ TEST_F(RunCalibrationSession, IgnoresReadoutOptionIfRowTimeIsEstimated) {
   EXPECT_EQ(result.calibration->camera.readout, Readout::rows);
 }
 
-TEST_F(RunCalibrationSession, StatesRmsOfGivenCameraIfItHasViews) {
+TEST_F(RunSession, StatesRmsOfGivenCameraIfItHasViews) {
   Calibration camera = read_calibration(session_file("camera.yaml"));
   camera.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.125, {}, {}};
   write_calibration(session_file("camera.yaml"), camera);
@@ -222,7 +220,7 @@ TEST_F(RunCalibrationSession, StatesRmsOfGivenCameraIfItHasViews) {
   EXPECT_THAT(find_step(run(), "lens").result.metrics, IsEmpty()) << "lens of another program";
 }
 
-TEST_F(RunCalibrationSession, WarnsOfDispersionCapturesWithoutPosition) {
+TEST_F(RunSession, WarnsOfDispersionCapturesWithoutPosition) {
   const std::string warning = "captures ignored: they have no position; add it to captures.csv";
   EXPECT_THAT(find_step(run(), "dispersion").result.warnings, Not(Contains(HasSubstr(warning))));
   fs::remove(session_file("dispersion/truth.csv"));
@@ -234,7 +232,7 @@ TEST_F(RunCalibrationSession, WarnsOfDispersionCapturesWithoutPosition) {
   EXPECT_EQ(result.calibration->dispersion->captures, 3);
 }
 
-TEST_F(RunCalibrationSession, WarnsOfCheckCaptureAtAnotherPosition) {
+TEST_F(RunSession, WarnsOfCheckCaptureAtAnotherPosition) {
   const auto& name = "was not taken at the position in its table";
   EXPECT_THAT(find_step(run(), "evaluate").result.warnings, IsEmpty());
   edit_session_file("check/truth.csv", "0002.png,0.321", "0002.png,0.381");
@@ -243,7 +241,7 @@ TEST_F(RunCalibrationSession, WarnsOfCheckCaptureAtAnotherPosition) {
       Contains(AllOf(StartsWith("0002.png "), HasSubstr(name), HasSubstr("its error is "))));
 }
 
-TEST_F(RunCalibrationSession, DoesNotWarnOfPositionErrorOfFixFromTwoLamps) {
+TEST_F(RunSession, DoesNotWarnOfPositionErrorOfFixFromTwoLamps) {
   fs::copy(rendered_capture_of_two_lamps(), session_file("check/0006.png"));
   write_session_file(
       "check/truth.csv",
@@ -258,7 +256,7 @@ TEST_F(RunCalibrationSession, DoesNotWarnOfPositionErrorOfFixFromTwoLamps) {
   EXPECT_THAT(find_step(result, "evaluate").result.warnings, IsEmpty());
 }
 
-TEST_F(RunCalibrationSession, StatesLampOffsetsOfCheckOnly) {
+TEST_F(RunSession, StatesLampOffsetsOfCheckOnly) {
   options.report = true;
   const SessionResult result = run();
   const auto& offsets = find_step(result, "check").result.lamp_offsets;
@@ -271,7 +269,7 @@ TEST_F(RunCalibrationSession, StatesLampOffsetsOfCheckOnly) {
   }
 }
 
-TEST_F(RunCalibrationSession, SkipsRepeatedImagesExceptInDrives) {
+TEST_F(RunSession, SkipsRepeatedImagesExceptInDrives) {
   options.report = true;
   for (const char* captures : {"rotation", "dispersion", "check", "line-x"}) {
     fs::copy(session_file(std::string(captures) + "/0000.png"),
@@ -287,7 +285,7 @@ TEST_F(RunCalibrationSession, SkipsRepeatedImagesExceptInDrives) {
   EXPECT_THAT(read_result("line-x-fixes.csv"), HasSubstr("\n0009.png,ok,"));
 }
 
-TEST_F(RunCalibrationSession, HistoryStatesProgramInputsAndDigestsOfEachStep) {
+TEST_F(RunSession, HistoryStatesProgramInputsAndDigestsOfEachStep) {
   const SessionResult result = run();
   ASSERT_TRUE(result.calibration);
   const auto& history = result.calibration->history;
@@ -308,9 +306,9 @@ TEST_F(RunCalibrationSession, HistoryStatesProgramInputsAndDigestsOfEachStep) {
     EXPECT_EQ(entry.program, "test");
     EXPECT_EQ(entry.version, "1.2");
     EXPECT_EQ(entry.options, "");
-    EXPECT_EQ(entry.inputs[1].sha256, compute_file_sha256(session_file("lamps.yaml")));
+    EXPECT_EQ(entry.inputs[1].sha256, hash_file(session_file("lamps.yaml")));
   }
-  EXPECT_EQ(history[1].inputs[2].sha256, compute_file_sha256(results_file("rotated.yaml")));
+  EXPECT_EQ(history[1].inputs[2].sha256, hash_file(results_file("rotated.yaml")));
 }
 
 }  // namespace

@@ -37,7 +37,7 @@ TEST_F(SessionResultsTest, KeepsOutputsOfLastRunUntilThoseOfThisRunArePublished)
   {
     SessionResults killed(results, session);
     killed.set_steps({kPlan[0]});
-    killed.remove_outputs_of_step("lens");
+    killed.remove_outputs("lens");
     EXPECT_EQ(killed.results_file_path("lens.yaml"), results / "steps/new/lens.yaml");
     folder.file("results/steps/new/lens.yaml", "new");
     killed.store_step_result("lens", "new key", StepResult());
@@ -46,13 +46,13 @@ TEST_F(SessionResultsTest, KeepsOutputsOfLastRunUntilThoseOfThisRunArePublished)
   }
   SessionResults now(results, session);
   now.set_steps(kPlan);
-  EXPECT_TRUE(now.find_cached_step_result("lens", "new key"));
-  EXPECT_TRUE(now.find_cached_step_result("rotation", "key of the rotation"));
-  now.remove_outputs_of_step("rotation");  // which has no output this time
+  EXPECT_TRUE(now.find_cached("lens", "new key"));
+  EXPECT_TRUE(now.find_cached("rotation", "key of the rotation"));
+  now.remove_outputs("rotation");  // which has no output this time
   EXPECT_TRUE(fs::exists(results / "rotated.yaml"));
   now.publish_outputs();
   EXPECT_EQ(TemporaryFolder::read_content(results / "lens.yaml"), "new");
-  EXPECT_TRUE(now.find_cached_step_result("lens", "new key"));
+  EXPECT_TRUE(now.find_cached("lens", "new key"));
   EXPECT_FALSE(fs::exists(results / "rotated.yaml"));
   EXPECT_FALSE(fs::exists(results / "steps/new"));
 }
@@ -62,13 +62,13 @@ TEST_F(SessionResultsTest, WriteRefusalJunitXmlReplacesThatOfAnySession) {
   const std::string owner = TemporaryFolder::read_content(results / "steps/session");
   for (const fs::path& other : {folder / "another", session, fs::path()}) {
     const std::string words = "refused " + other.string();
-    write_refusal_junit_xml(results, other, words);
+    write_refusal_junit(results, other, words);
     EXPECT_THAT(TemporaryFolder::read_content(results / "junit.xml"), HasSubstr(words));
   }
   EXPECT_EQ(TemporaryFolder::read_content(results / "steps/session"), owner);
   fs::remove_all(results);
   fs::create_directories(results / "boards");
-  write_refusal_junit_xml(results, session, "refused");
+  write_refusal_junit(results, session, "refused");
   EXPECT_FALSE(fs::exists(results / "junit.xml")) << "no results";
 }
 
@@ -81,8 +81,8 @@ TEST_F(SessionResultsTest, KeepsForeignFilesAndRejectsThemAsOutputs) {
     first.set_steps(kPlan);
     folder.file("results/lens.svg", "mine, beside results");
     first.set_steps(kPlan);
-    first.remove_evaluation_outputs();
-    first.remove_outputs_of_all_steps();
+    first.remove_evaluation();
+    first.remove_all_outputs();
   }
   for (const std::string& name : mine) {
     EXPECT_EQ(TemporaryFolder::read_content(results / name), "mine") << name;
@@ -103,7 +103,7 @@ TEST_F(SessionResultsTest, RemovesNoFileOutsideResultsFolderDespiteForgedOutputL
                                            (folder / "outside.txt").string() + "\n..\n");
   SessionResults taken(results, session);
   taken.set_steps(kPlan);
-  taken.remove_outputs_of_all_steps();
+  taken.remove_all_outputs();
   EXPECT_TRUE(fs::exists(folder / "outside.txt"));
 }
 
@@ -117,7 +117,7 @@ TEST_F(SessionResultsTest, RemovesOnlyKnownOutputNamesOfForgedOutputList) {
               "steps/lock\nsteps/session\nsteps/outputs\nmine.txt\nline-x\nreport.html\nline-x" +
                   end_of_name);
   const SessionResults taken(results, session);
-  taken.remove_outputs_of_all_steps();
+  taken.remove_all_outputs();
   EXPECT_FALSE(fs::exists(results / "report.html"));
   for (const char* name : {"steps/lock", "steps/session", "steps/outputs", "mine.txt", "line-x"}) {
     EXPECT_TRUE(fs::exists(results / name)) << name;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// run_calibration_session(): steps, their outputs and their reuse.
+/// run_session(): steps, their outputs and their reuse.
 #include "session/session.h"
 
 #include <gmock/gmock.h>
@@ -15,7 +15,7 @@ namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
-using RunCalibrationSession = RenderedSession;
+using RunSession = RenderedSession;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -30,7 +30,7 @@ std::set<std::string> list_files(const fs::path& folder) {
   return names;
 }
 
-TEST_F(RunCalibrationSession, RunsStepsInOrderAndWritesOutputsForGivenCamera) {
+TEST_F(RunSession, RunsStepsInOrderAndWritesOutputsForGivenCamera) {
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::pass);
   EXPECT_EQ(result.failure, StepFailure::none);
@@ -43,7 +43,7 @@ TEST_F(RunCalibrationSession, RunsStepsInOrderAndWritesOutputsForGivenCamera) {
                                    "junit.xml", "rotated.yaml", "session.json"}));
 }
 
-TEST_F(RunCalibrationSession, EstimatesTiltLeverArmAndDispersionOfRenderedCamera) {
+TEST_F(RunSession, EstimatesTiltLeverArmAndDispersionOfRenderedCamera) {
   const SessionResult result = run();
   ASSERT_TRUE(result.calibration && result.calibration->rotation_center &&
               result.calibration->dispersion);
@@ -61,7 +61,7 @@ TEST_F(RunCalibrationSession, EstimatesTiltLeverArmAndDispersionOfRenderedCamera
   EXPECT_FALSE(read_calibration(results_file("rotated.yaml")).dispersion);
 }
 
-TEST_F(RunCalibrationSession, ReportAddsPlotsDrivesAndReportHtml) {
+TEST_F(RunSession, ReportAddsPlotsDrivesAndReportHtml) {
   options.report = true;
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
@@ -86,7 +86,7 @@ TEST_F(RunCalibrationSession, ReportAddsPlotsDrivesAndReportHtml) {
   }
 }
 
-TEST_F(RunCalibrationSession, LocatesDrivesInOrderOfNames) {
+TEST_F(RunSession, LocatesDrivesInOrderOfNames) {
   fs::copy(session_file("line-x"), session_file("line-a"));
   fs::copy(session_file("line-x"), session_file("line-without-positions"));
   fs::remove(session_file("line-without-positions/truth.csv"));
@@ -97,7 +97,7 @@ TEST_F(RunCalibrationSession, LocatesDrivesInOrderOfNames) {
   EXPECT_FALSE(has_result("line-without-positions-fixes.csv"));
 }
 
-TEST_F(RunCalibrationSession, NotifiesObserverOfEachStepAndOfImages) {
+TEST_F(RunSession, NotifiesObserverOfEachStepAndOfImages) {
   std::vector<std::string> events;
   std::size_t images = 0;
   SessionObserver observer;
@@ -110,7 +110,7 @@ TEST_F(RunCalibrationSession, NotifiesObserverOfEachStepAndOfImages) {
     EXPECT_LE(done, total);
     ++images;
   };
-  run_calibration_session(session_folder, results_folder, options, observer);
+  run_session(session_folder, results_folder, options, observer);
   EXPECT_THAT(events, ElementsAre("start lens", "done lens", "start rotation", "done rotation",
                                   "start dispersion", "done dispersion", "start check",
                                   "done check", "start evaluate", "done evaluate"));
@@ -118,14 +118,14 @@ TEST_F(RunCalibrationSession, NotifiesObserverOfEachStepAndOfImages) {
   events.clear();
   images = 0;
   fs::remove(results_file("steps/rotation.json"));
-  run_calibration_session(session_folder, results_folder, options, observer);
+  run_session(session_folder, results_folder, options, observer);
   EXPECT_THAT(events, ElementsAre("start lens", "reused lens", "start rotation", "done rotation",
                                   "start dispersion", "reused dispersion", "start check",
                                   "reused check", "start evaluate", "reused evaluate"));
   EXPECT_GE(images, 8U);
 }
 
-TEST_F(RunCalibrationSession, ReusesStepsOnlyIfTheirInputsAreUnchanged) {
+TEST_F(RunSession, ReusesStepsOnlyIfTheirInputsAreUnchanged) {
   run();
   const std::string session = read_result("session.json"), junit = read_result("junit.xml");
   EXPECT_THAT(list_executed_steps(run()), IsEmpty());
@@ -161,7 +161,7 @@ TEST_F(RunCalibrationSession, ReusesStepsOnlyIfTheirInputsAreUnchanged) {
   expect_executed_steps("drive that is not reported", {});
 }
 
-TEST_F(RunCalibrationSession, RunsDriveAndEvaluationAgainIfPositionsOfDriveChange) {
+TEST_F(RunSession, RunsDriveAndEvaluationAgainIfPositionsOfDriveChange) {
   options.report = true;
   run();
   edit_session_file("line-x/truth.csv", "-0.280000000,-0.010000000", "-0.281000000,-0.010000000");
@@ -170,7 +170,7 @@ TEST_F(RunCalibrationSession, RunsDriveAndEvaluationAgainIfPositionsOfDriveChang
   EXPECT_THAT(list_executed_steps(run()), ElementsAre("line-x", "evaluate"));
 }
 
-TEST_F(RunCalibrationSession, RunsStepsAgainIfProgramOrOptionsChange) {
+TEST_F(RunSession, RunsStepsAgainIfProgramOrOptionsChange) {
   run();
   const std::vector<std::string> all{"lens", "rotation", "dispersion", "check", "evaluate"};
   options.program.version = "1.3";
@@ -186,7 +186,7 @@ TEST_F(RunCalibrationSession, RunsStepsAgainIfProgramOrOptionsChange) {
               ElementsAre("rotation", "dispersion", "line-x", "evaluate"));
 }
 
-TEST_F(RunCalibrationSession, RunsStepsOfRoomThatIsSelected) {
+TEST_F(RunSession, RunsStepsOfRoomThatIsSelected) {
   std::string lamps = TemporaryFolder::read_content(session_file("lamps.yaml"));
   for (auto at = lamps.find("duty: 0.5"); at != std::string::npos;
        at = lamps.find("duty: 0.5", at + 20)) {
@@ -205,7 +205,7 @@ TEST_F(RunCalibrationSession, RunsStepsOfRoomThatIsSelected) {
   EXPECT_THAT(attic.reason, HasSubstr("attic"));
 }
 
-TEST_F(RunCalibrationSession, RunsStepAgainIfItsOutputWasChangedOrRemoved) {
+TEST_F(RunSession, RunsStepAgainIfItsOutputWasChangedOrRemoved) {
   options.report = true;
   run();
   const std::string rotated = read_result("rotated.yaml");
@@ -226,7 +226,7 @@ TEST_F(RunCalibrationSession, RunsStepAgainIfItsOutputWasChangedOrRemoved) {
   }
 }
 
-TEST_F(RunCalibrationSession, RunsNamedStepsAgainOnRequest) {
+TEST_F(RunSession, RunsNamedStepsAgainOnRequest) {
   run();
   options.steps_to_redo = {"evaluate", "rotation"};
   EXPECT_THAT(list_executed_steps(run()), ElementsAre("rotation", "evaluate"));
@@ -234,7 +234,7 @@ TEST_F(RunCalibrationSession, RunsNamedStepsAgainOnRequest) {
   EXPECT_THAT(list_executed_steps(run()), ElementsAre("lens"));
 }
 
-TEST_F(RunCalibrationSession, RejectsRequestForUnknownStep) {
+TEST_F(RunSession, RejectsRequestForUnknownStep) {
   options.steps_to_redo = {"rotation", "checks"};
   EXPECT_THAT([&] { run(); },
               ThrowsMessage<std::invalid_argument>(
@@ -250,7 +250,7 @@ TEST_F(RunCalibrationSession, RejectsRequestForUnknownStep) {
   EXPECT_THAT([&] { run(); }, ThrowsMessage<std::invalid_argument>(HasSubstr("no step check;")));
 }
 
-TEST_F(RunCalibrationSession, EstimatesRowTimeIfCameraHasNone) {
+TEST_F(RunSession, EstimatesRowTimeIfCameraHasNone) {
   write_camera(std::nullopt);
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
@@ -273,7 +273,7 @@ TEST_F(RunCalibrationSession, EstimatesRowTimeIfCameraHasNone) {
   EXPECT_THAT(list_executed_steps(run()), ElementsAre("row-time", "rotation"));
 }
 
-TEST_F(RunCalibrationSession, StatesRowTimeInRotationOnceEstimateIsGiven) {
+TEST_F(RunSession, StatesRowTimeInRotationOnceEstimateIsGiven) {
   write_camera(std::nullopt);
   run();
   fs::copy(results_file("camera.yaml"), session_file("camera.yaml"),
@@ -283,7 +283,7 @@ TEST_F(RunCalibrationSession, StatesRowTimeInRotationOnceEstimateIsGiven) {
   EXPECT_TRUE(find_metric_value(find_step(result, "rotation").result.metrics, "row_time_us"));
 }
 
-TEST_F(RunCalibrationSession, RemovesRowTimeEstimateOnceRowTimeIsGiven) {
+TEST_F(RunSession, RemovesRowTimeEstimateOnceRowTimeIsGiven) {
   const std::string camera = TemporaryFolder::read_content(session_file("camera.yaml"));
   write_camera(std::nullopt);
   run();
@@ -294,7 +294,7 @@ TEST_F(RunCalibrationSession, RemovesRowTimeEstimateOnceRowTimeIsGiven) {
   EXPECT_FALSE(has_result("steps/row-time.json"));
 }
 
-TEST_F(RunCalibrationSession, UsesRotatedCalibrationWithoutDispersion) {
+TEST_F(RunSession, UsesRotatedCalibrationWithoutDispersion) {
   options.report = true;
   run();
   fs::remove_all(session_file("dispersion"));

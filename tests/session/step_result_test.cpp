@@ -14,7 +14,7 @@ using testing::ElementsAre;
 
 Observation rejected(const char* file, RejectionReason reason, const char* message) {
   Observation image{file};
-  image.set_image_rejection(reason, message);
+  image.reject(reason, message);
   return image;
 }
 
@@ -39,7 +39,7 @@ TEST(ListSkippedImages, NamesFoldersWhenThereAreSeveral) {
       ElementsAre("g/a.png: is empty"));
 }
 
-TEST(AddImageIntakeRemarks, CombinesRejectedFramesOfVideoByReason) {
+TEST(AddIntakeRemarks, CombinesRejectedFramesOfVideoByReason) {
   Observations seen;
   seen.images = {rejected("a.png", RejectionReason::too_few_corners, "shows 1 tag"),
                  rejected("b.avi#000000", RejectionReason::too_few_corners, "shows 2 tags"),
@@ -47,7 +47,7 @@ TEST(AddImageIntakeRemarks, CombinesRejectedFramesOfVideoByReason) {
                  rejected("c.avi#000000", RejectionReason::too_few_corners, "shows 2 tags"),
                  rejected("b.avi#000004", RejectionReason::same_view, "is as #000003")};
   StepResult result;
-  add_image_intake_remarks(seen, result);
+  add_intake_remarks(seen, result);
   EXPECT_TRUE(result.has_succeeded());
   EXPECT_THAT(
       lines(result.skipped),
@@ -59,7 +59,7 @@ TEST(AddImageIntakeRemarks, CombinesRejectedFramesOfVideoByReason) {
                           "c.avi#000000: shows 2 tags", "b.avi#000004: is as #000003"));
 }
 
-TEST(AddImageIntakeRemarks, WarnsOfNumberAndFirstThreeNamesOfDoubtfulImages) {
+TEST(AddIntakeRemarks, WarnsOfNumberAndFirstThreeNamesOfDoubtfulImages) {
   const std::array expected{
       "a.png: 9 outliers", "2 doubtful images are used (a.png, b.png), the first: 9 outliers",
       "3 doubtful images are used (a.png, b.png, c.png), the first: 9 outliers",
@@ -72,18 +72,18 @@ TEST(AddImageIntakeRemarks, WarnsOfNumberAndFirstThreeNamesOfDoubtfulImages) {
     seen.images.push_back(Observation{std::string("f/") + "abcd"[i] + ".png"});
     seen.images.back().doubt = i == 0 ? "9 outliers" : "overexposed";
     StepResult result;
-    add_image_intake_remarks(seen, result);
+    add_intake_remarks(seen, result);
     EXPECT_THAT(result.warnings, ElementsAre(expected[i]));
   }
 }
 
-TEST(AddImageIntakeRemarks, CopiesFailureAndPrependsWarnings) {
+TEST(AddIntakeRemarks, CopiesFailureAndPrependsWarnings) {
   Observations seen;
   seen.warnings = {"dark"};
   seen.failure = {true, "shows another board", "board.yaml"};
   StepResult result;
   result.warnings = {"later"};
-  add_image_intake_remarks(seen, result);
+  add_intake_remarks(seen, result);
   EXPECT_EQ(result.failure, StepFailure::wrong_board);
   EXPECT_EQ(result.file_to_correct, "board.yaml");
   EXPECT_THAT(result.warnings, ElementsAre("dark", "later"));

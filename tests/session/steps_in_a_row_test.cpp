@@ -61,12 +61,12 @@ struct CalibrationChain {
   }
 
   Calibration calibrated() const {
-    const RotationResult rotation = run_rotation_calibration_step(turns, RotationMethod::axis, {});
+    const RotationResult rotation = run_rotation_step(turns, RotationMethod::axis, {});
     EXPECT_TRUE(rotation.has_succeeded()) << rotation.message;
     LampCaptures leveled = turns;
     leveled.calibration = rotation.calibration;
-    const DispersionResult dispersion = run_dispersion_calibration_step(
-        leveled, known, DispersionMethod::camera, DispersionCircle::mean, {});
+    const DispersionResult dispersion =
+        run_dispersion_step(leveled, known, DispersionMethod::camera, DispersionCircle::mean, {});
     EXPECT_TRUE(dispersion.has_succeeded());
     return dispersion.calibration;
   }
@@ -96,8 +96,8 @@ TEST(SequentialCalibration, JointCovarianceWithLensPredictsChangeOfZenithAndOffs
     error[i] = calibration.camera.intrinsics[k] - camera.intrinsics[k];
   }
   const Calibration moved = row.calibrated();
-  const Eigen::Vector2d zenith = compute_normalized_zenith_point(*moved.rotation_center) -
-                                 compute_normalized_zenith_point(*exact.rotation_center);
+  const Eigen::Vector2d zenith =
+      compute_zenith_point(*moved.rotation_center) - compute_zenith_point(*exact.rotation_center);
   ASSERT_TRUE(exact.covariance);
   const Eigen::Vector2d zenith_said =
       derivative_by_lens(*exact.covariance, kZenithParameter, error.size()) * error;
@@ -124,14 +124,14 @@ TEST_P(SequentialCalibrationFixes, FixCovarianceMatchesErrorsOfFixes) {
     CalibrationChain row(random, 0.1, GetParam());
     const Calibration calibration = row.calibrated();
     const Eigen::Vector2d zenith_error =
-        compute_normalized_zenith_point(*calibration.rotation_center) -
-        compute_normalized_zenith_point(*row.survey.truth.calibration.rotation_center);
+        compute_zenith_point(*calibration.rotation_center) -
+        compute_zenith_point(*row.survey.truth.calibration.rotation_center);
     const Eigen::Vector2d& offset_px = calibration.dispersion->offset_px;
     const auto squared = [](const Eigen::Vector2d& error, const Eigen::Matrix2d& covariance) {
       return error.dot(covariance.inverse() * error) / (2 * trials);
     };
     zenith += squared(zenith_error, *find_parameter_covariance(calibration, kZenithParameter));
-    offset += squared(offset_px, *compute_dispersion_offset_covariance(calibration));
+    offset += squared(offset_px, *compute_offset_covariance(calibration));
     const Positioner positioner(row.survey.truth.map, calibration);
     for (int k = 0; k < 5; ++k) {
       const double x_m = random.uniform(-0.6, 0.6), y_m = random.uniform(-0.3, 0.3);

@@ -111,7 +111,7 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
       const Eigen::Vector3d middle((u + du) * views.imager_px[0], (v + dv) * views.imager_px[1],
                                    lens.focal_px().x());
       BoardDetection seen = views.view(rotation, middle * (z_m / middle.z()), random, noise_px);
-      if (!lattice.are_corners_sufficient_for_pose(seen)) continue;
+      if (!lattice.can_determine_pose(seen)) continue;
       any = true;
       for (TagDetection& tag : seen.tags) tag = shrunk(tag, shift_px);
       std::string name = std::to_string(place);
@@ -120,19 +120,19 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
     }
     if (any) ++place;
   }
-  reject_repeated_images(input.observations.images, ImageUse::boards, {});
+  reject_repeated(input.observations.images, ImageUse::boards, {});
   return {std::move(input), lens};
 }
 
 /// Returns the largest error in the calibrated region divided by the largest reported one. Returns
 /// std::nullopt if no lens is found or a gate fails.
 inline std::optional<double> error_over_stated(const ThinSet& set) {
-  const LensResult result = run_lens_calibration_step(set.input, {});
+  const LensResult result = run_lens_step(set.input, {});
   if (!result.has_succeeded() ||
-      !describe_failed_gates(check_gates(make_default_lens_gates(), result.metrics)).empty()) {
+      !describe_failed_gates(check_gates(make_lens_gates(), result.metrics)).empty()) {
     return {};
   }
-  const auto difference = compute_projection_difference(
+  const auto difference = compare_projections(
       set.lens, result.lens.solution.fitted_lens(), result.lens.solution.problem.imager_px,
       [&](const Eigen::Vector2d& pixel) {
         return polygon_contains(result.lens.report.region, pixel) ? 1.0 : INFINITY;

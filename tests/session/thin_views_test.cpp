@@ -36,7 +36,7 @@ std::map<std::string, Outcome> outcomes() {
   return outcomes;
 }
 
-TEST(RunLensCalibrationStep, GatesFailForInsufficientViewsAndPassingErrorsAreBelow2Point5Sds) {
+TEST(RunLensStep, GatesFailForInsufficientViewsAndPassingErrorsAreBelow2Point5Sds) {
   // Limit for these sets; of several hundred sets, one slightly exceeds three.
   constexpr double most = 2.5;
   int passed = 0;

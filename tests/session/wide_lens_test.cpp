@@ -38,7 +38,7 @@ LensInput make_wide_set(double reach_deg, LensModel model) {
 }
 
 TEST(RunLensCalibrationStepWithWideLens, ProposesFisheyeWhenBoardIsBeyondRaysOfModel) {
-  const LensResult result = run_lens_calibration_step(make_wide_set(180, LensModel::opencv8), {});
+  const LensResult result = run_lens_step(make_wide_set(180, LensModel::opencv8), {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.message, AllOf(HasSubstr("30 views with the board: it is visible up to 10"),
                                     HasSubstr("degrees off axis, where " +
@@ -53,8 +53,7 @@ TEST(RunLensCalibrationStepWithWideLens, LensErrorsAreWithinThreeSigmasIfGatesPa
   constexpr double sigmas = 3;
   int compared = 0;
   for (const double reach_deg : {60, 75, 87}) {
-    const LensResult result =
-        run_lens_calibration_step(make_wide_set(reach_deg, LensModel::opencv8), {});
+    const LensResult result = run_lens_step(make_wide_set(reach_deg, LensModel::opencv8), {});
     if (!result.has_succeeded()) {
       EXPECT_THAT(result.message, HasSubstr("use --lens OPENCV_FISHEYE"));
       continue;
@@ -63,9 +62,8 @@ TEST(RunLensCalibrationStepWithWideLens, LensErrorsAreWithinThreeSigmasIfGatesPa
       EXPECT_THAT(result.warnings, Contains(HasSubstr("use --lens OPENCV_FISHEYE")));
       EXPECT_EQ(result.lens.better_model, LensModel::fisheye);
     }
-    if (!describe_failed_gates(check_gates(make_default_lens_gates(), result.metrics)).empty())
-      continue;
-    const auto difference = compute_projection_difference(
+    if (!describe_failed_gates(check_gates(make_lens_gates(), result.metrics)).empty()) continue;
+    const auto difference = compare_projections(
         wide_lens(), result.lens.solution.fitted_lens(), kWideImager,
         [&](const Eigen::Vector2d& pixel) {
           return polygon_contains(result.lens.report.region, pixel) ? 1.0 : INFINITY;
@@ -78,15 +76,15 @@ TEST(RunLensCalibrationStepWithWideLens, LensErrorsAreWithinThreeSigmasIfGatesPa
 }
 
 /// OPENCV5 does not fit a lens of this width; detecting this takes seconds.
-TEST(RunLensCalibrationStep, ProposesFisheyeForUnsuitableModelWithoutBlamingBoard) {
-  const LensResult result = run_lens_calibration_step(make_wide_set(87, LensModel::opencv5), {});
+TEST(RunLensStep, ProposesFisheyeForUnsuitableModelWithoutBlamingBoard) {
+  const LensResult result = run_lens_step(make_wide_set(87, LensModel::opencv5), {});
   ASSERT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.message, AllOf(HasSubstr("OPENCV_FISHEYE fits with 0.05 px"),
                                     HasSubstr("use --lens OPENCV_FISHEYE"),
                                     Not(HasSubstr("board.yaml")), Not(HasSubstr("cannot be"))));
 }
 
-TEST(RunLensCalibrationStep, ValidRegionCoversImageWhenModelFits) {
+TEST(RunLensStep, ValidRegionCoversImageWhenModelFits) {
   constexpr int count = 30;
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   LensInput input{{}, views.board, "board.yaml", {}, 0, WarpChoice::automatic};
@@ -96,7 +94,7 @@ TEST(RunLensCalibrationStep, ValidRegionCoversImageWhenModelFits) {
     input.observations.images.push_back(
         observed({std::to_string(i), views.imager_px, views.random_view(random, 0.05)}));
   }
-  const LensResult result = run_lens_calibration_step(input, {});
+  const LensResult result = run_lens_step(input, {});
   ASSERT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_FALSE(result.lens.better_model);
   EXPECT_THAT(result.warnings, testing::IsEmpty());

@@ -49,15 +49,15 @@ TEST(ReadSceneFile, RejectsInvalidMissingOrUnknownArchiveKeys) {
   EXPECT_THAT(refusal("tilt_deg: 1", "tilt_deg: 1, odd: 2"), HasSubstr("key 'odd' is unknown"));
 }
 
-TEST(MakeSimulatedArchiveSession, AssignsDamageAndFaultToGivenFractionOfSessions) {
+TEST(MakeArchiveSession, AssignsDamageAndFaultToGivenFractionOfSessions) {
   const Scene scene = archive_scene();
   std::size_t damaged = 0, faulty = 0;
   std::set<std::string> kinds, faults;
   for (std::size_t i = 0; i < 200; ++i) {
-    const ArchiveSession session = make_simulated_archive_session(scene, i);
+    const ArchiveSession session = make_archive_session(scene, i);
     if (session.damage != ArchiveDamage::none) {
       ++damaged;
-      kinds.insert(std::string(archive_damage_name(session.damage)) + " " + session.damaged);
+      kinds.insert(std::string(damage_name(session.damage)) + " " + session.damaged);
       EXPECT_EQ(session.fault, ArchiveFault::none);
     }
     if (session.fault != ArchiveFault::none) {
@@ -71,13 +71,13 @@ TEST(MakeSimulatedArchiveSession, AssignsDamageAndFaultToGivenFractionOfSessions
   EXPECT_EQ(faults.size(), 4U);
 }
 
-TEST(MakeSimulatedArchiveSession, SessionsOfCameraShareLensWithinGivenVariation) {
+TEST(MakeArchiveSession, SessionsOfCameraShareLensWithinGivenVariation) {
   const Scene scene = archive_scene();
   std::set<double> focal_lengths;
   std::set<std::uint64_t> seeds;
   for (std::size_t i = 0; i < 100; i += 2) {
-    const ArchiveSession first = make_simulated_archive_session(scene, i),
-                         second = make_simulated_archive_session(scene, i + 1);
+    const ArchiveSession first = make_archive_session(scene, i),
+                         second = make_archive_session(scene, i + 1);
     EXPECT_EQ(first.camera, second.camera);
     EXPECT_NE(first.session, second.session);
     EXPECT_EQ(first.scene.camera.intrinsics, second.scene.camera.intrinsics);
@@ -98,10 +98,10 @@ TEST(MakeSimulatedArchiveSession, SessionsOfCameraShareLensWithinGivenVariation)
   EXPECT_EQ(seeds.size(), 100U);
 }
 
-TEST(MakeSimulatedArchiveSession, ChangesSceneAccordingToFault) {
+TEST(MakeArchiveSession, ChangesSceneAccordingToFault) {
   const Scene scene = archive_scene();
   for (std::size_t i = 0; i < 60; ++i) {
-    const ArchiveSession session = make_simulated_archive_session(scene, i);
+    const ArchiveSession session = make_archive_session(scene, i);
     EXPECT_EQ(tilt_rad(session.scene) > tilt_rad(scene) + 0.021,
               session.fault == ArchiveFault::tilted)
         << "2 degrees as the scene has, 1 more in any direction; 4 across";
@@ -111,10 +111,10 @@ TEST(MakeSimulatedArchiveSession, ChangesSceneAccordingToFault) {
   }
 }
 
-TEST(SimulateSessionArchive, RejectsSceneWithoutArchiveKeyOrRequiredFolders) {
+TEST(SimulateArchive, RejectsSceneWithoutArchiveKeyOrRequiredFolders) {
   const auto refusal = [](const Scene& scene) -> std::string {
     try {
-      simulate_session_archive(scene, 1, "unused", {}, {});
+      simulate_archive(scene, 1, "unused", {}, {});
     } catch (const std::invalid_argument& failure) {
       return failure.what();
     }

@@ -99,12 +99,11 @@ TEST_P(FrameRendererBoard, RenderedCornersMatchTrueCorners) {
   double worst_px = 0, squares = 0;
   int corners = 0;
   for (std::size_t index = 0; index < 6; ++index) {
-    const BoardShot shot = make_board_capture_parameters(scene_, views_, index);
-    const cv::Mat1d image(renderer.render_board_in_electrons(shot) / 1e3);
+    const BoardShot shot = make_board_shot(scene_, views_, index);
+    const cv::Mat1d image(renderer.render_board(shot) / 1e3);
     const cv::Mat1d transposed(image.t());
     std::map<int, std::map<int, Eigen::Vector2d>> tags;
-    for (const auto& [tag, corner, pixel] :
-         project_scene_corners_into_image(scene_, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] : list_true_corners(scene_, renderer, shot)) {
       constexpr double edge_px = 8;
       if (pixel.minCoeff() > edge_px && pixel.x() < 799 - edge_px && pixel.y() < 599 - edge_px) {
         tags[tag.value()][corner] = pixel;
@@ -132,10 +131,10 @@ TEST_P(FrameRendererBoard, TrueCornersMatchMrcalProjection) {
   const FrameRenderer renderer(scene_);
   const MrcalOracle mrcal(std::string(lens_model_name(scene_.camera.lens_model)),
                           scene_.camera.intrinsics);
-  const BoardShot shot = make_board_capture_parameters(scene_, views_, 1);
+  const BoardShot shot = make_board_shot(scene_, views_, 1);
   const auto layout = list_board_tags(scene_.board->pattern);
   const Eigen::Vector2d field_m = compute_tag_field_size_m(scene_.board->pattern);
-  const auto truth = project_scene_corners_into_image(scene_, renderer, shot);
+  const auto truth = list_true_corners(scene_, renderer, shot);
   ASSERT_FALSE(truth.empty());
   for (const auto& [tag, corner, pixel] : truth) {
     ASSERT_TRUE(tag);
@@ -175,12 +174,12 @@ TEST(FrameRenderer, BlursBoardEdgeBeforePixelIntegration) {
   scene.optics.blur_px = sigma_px;
   scene.board = plain_board();
   const FrameRenderer renderer(scene);
-  const BoardShot shot = make_board_capture_parameters(scene, board_views(1, 0.171, 0, 0, 0), 0);
-  const cv::Mat1f image(renderer.render_board_in_electrons(shot) / 1e3);
+  const BoardShot shot = make_board_shot(scene, board_views(1, 0.171, 0, 0, 0), 0);
+  const cv::Mat1f image(renderer.render_board(shot) / 1e3);
   double worst = 0;
   int edges = 0;
   // Left of a tag there is white, and its black border is seven pixels wide.
-  for (const auto& [tag, corner, pixel] : project_scene_corners_into_image(scene, renderer, shot)) {
+  for (const auto& [tag, corner, pixel] : list_true_corners(scene, renderer, shot)) {
     constexpr int reach_px = 4, down_px = 20;
     if (corner != 3 || pixel.x() < reach_px || pixel.y() + down_px > 599) continue;
     const int row = static_cast<int>(pixel.y()) + down_px;
@@ -203,8 +202,8 @@ double level_at(const Eigen::Vector2d& pixel, double vignetting_power) {
       {},        3e-5,       Readout::rows};
   scene.optics.vignetting_power = vignetting_power;
   scene.board = plain_board();
-  const cv::Mat1f image = FrameRenderer(scene).render_board_in_electrons(
-      make_board_capture_parameters(scene, board_views(1, 5, 0, 0, 0), 0));
+  const cv::Mat1f image =
+      FrameRenderer(scene).render_board(make_board_shot(scene, board_views(1, 5, 0, 0, 0), 0));
   return image(static_cast<int>(pixel.y()), static_cast<int>(pixel.x()));
 }
 

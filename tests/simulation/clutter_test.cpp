@@ -20,11 +20,11 @@ class FrameRendererClutter : public testing::Test {
     const FrameRenderer renderer(scene_);
     LampShot shot = shot_at(scene_, {0, 0, 0.1}, 0);
     for (SquareWave& wave : shot.waves) wave.duty = duty;
-    return renderer.render_lamps_in_electrons(shot);
+    return renderer.render_lamps(shot);
   }
   double in_view() {
     const FrameRenderer renderer(scene_);
-    return find_true_lamps_in_image(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0))
+    return list_true_lamps(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0))
         .at(0)
         .visible_fraction;
   }

@@ -24,7 +24,7 @@ class FrameRendererDownlight : public testing::Test {
     const FrameRenderer renderer(scene_);
     LampShot shot = shot_at(scene_, eye_m, 0);
     shot.waves[0].duty = duty;
-    return renderer.render_lamps_in_electrons(shot);
+    return renderer.render_lamps(shot);
   }
   /// Returns the intersection of a pixel's ray with the rim's plane, from the lamp, for a camera
   /// straight below.
@@ -58,7 +58,7 @@ TEST_F(FrameRendererDownlight, SourceIsShiftedByRecessDepthTimesRaySlope) {
   EXPECT_LT((core_px - projected(glow().position_m - 0.05 * slope, shot)).norm(), 0.002);
   EXPECT_NEAR((core_px - rim_px).norm(), 0.05 * slope.norm() / 1.5 * 500, 0.002);
   const FrameRenderer renderer(scene_);
-  EXPECT_LT((find_true_lamps_in_image(scene_, renderer, shot).at(0).pixel - rim_px).norm(), 1e-6)
+  EXPECT_LT((list_true_lamps(scene_, renderer, shot).at(0).pixel - rim_px).norm(), 1e-6)
       << "the truth is the rim's center";
 }
 
@@ -95,7 +95,7 @@ TEST_F(FrameRendererDownlight, HaloDecaysExponentiallyOutsideRim) {
   EXPECT_EQ(image(299, 399), without(299, 399)) << "not inside the rim";
   EXPECT_EQ(image(299, 399 + 30 + 82), 0) << "8 lengths are 80 px";
   EXPECT_GT(image(299, 399 + 30 + 78), 0);
-  EXPECT_NEAR(compute_light_source_radius_m(glow()), 0.09 + 0.24, 1e-12);
+  EXPECT_NEAR(compute_source_radius_m(glow()), 0.09 + 0.24, 1e-12);
 }
 
 TEST_F(FrameRendererDownlight, HaloAndRecessFlickerInPhaseWithLamp) {
@@ -176,7 +176,7 @@ TEST_F(FrameRendererDownlight, RendersCrescentAtNearRimWhenRimHidesSource) {
   EXPECT_LT(crescent.centroid_px.x() - rim_px.x(), 30);
   EXPECT_NEAR(crescent.centroid_px.y(), rim_px.y(), 0.01);
   const FrameRenderer renderer(scene_);
-  const auto lamps = find_true_lamps_in_image(scene_, renderer, shot_at(scene_, eye_m, 0));
+  const auto lamps = list_true_lamps(scene_, renderer, shot_at(scene_, eye_m, 0));
   ASSERT_EQ(lamps.size(), 1U);
   EXPECT_LT((lamps[0].pixel - rim_px).norm(), 1e-6) << "the truth is the rim's center";
 }
@@ -194,12 +194,12 @@ TEST_F(FrameRendererDownlight, HotSpotsAddGaussianBrightnessInsideRim) {
   EXPECT_EQ(more(435, 299), 0) << "beyond the rim";
 }
 
-TEST(DrawRandomSceneParts, DrawsHotSpotsWithinBoundsBySeedAndLampId) {
+TEST(DrawRandomParts, DrawsHotSpotsWithinBoundsBySeedAndLampId) {
   Scene scene = plain_scene();
   scene.lamps.push_back(scene.lamps[0]);
   scene.lamps[1].id = 2;
   for (SceneLamp& lamp : scene.lamps) lamp.glow.random_chips = RandomChips{7, 0.12, 0.75, 0.3, 0.8};
-  draw_random_scene_parts(scene);
+  draw_random_parts(scene);
   const auto spots = scene.lamps[0].glow.hot_spots;
   ASSERT_EQ(spots.size(), 7U);
   for (const HotSpot& spot : spots) {
@@ -210,13 +210,13 @@ TEST(DrawRandomSceneParts, DrawsHotSpotsWithinBoundsBySeedAndLampId) {
   }
   EXPECT_NE(scene.lamps[1].glow.hot_spots.at(0).center_m, spots[0].center_m) << "another lamp";
   Scene again = scene;
-  draw_random_scene_parts(again);
+  draw_random_parts(again);
   EXPECT_EQ(again.lamps[0].glow.hot_spots.at(6).center_m, spots[6].center_m) << "the same seed";
   again.lamps = {scene.lamps[1], scene.lamps[0]};
-  draw_random_scene_parts(again);
+  draw_random_parts(again);
   EXPECT_EQ(again.lamps[1].glow.hot_spots.at(0).center_m, spots[0].center_m) << "by its id";
   again.seed = 2;
-  draw_random_scene_parts(again);
+  draw_random_parts(again);
   ASSERT_EQ(again.lamps[1].glow.hot_spots.size(), 7U);
   EXPECT_NE(again.lamps[1].glow.hot_spots[0].center_m, spots[0].center_m) << "another seed";
 }

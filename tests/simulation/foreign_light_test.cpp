@@ -23,7 +23,7 @@ class FrameRendererForeignLight : public testing::Test {
 
   LampShot shot() const { return shot_at(scene_, {0, 0, 0.1}, 0); }
   cv::Mat1f rendered(const LampShot& shot) const {
-    return FrameRenderer(scene_).render_lamps_in_electrons(shot);
+    return FrameRenderer(scene_).render_lamps(shot);
   }
   cv::Mat1f rendered() const { return rendered(shot()); }
   Scene scene_ = plain_scene();
@@ -148,7 +148,7 @@ TEST_F(FrameRendererForeignLight, SlantedBlindRendersBarsAlongFirstEdge) {
 TEST_F(FrameRendererForeignLight, SignRendersSeededRandomStrokesOfItsRadiance) {
   scene_.ambient_e_per_s = 1e6;
   scene_.clutter.signs = {{{{-0.3, -0.15, 1.6}, {0.6, 0, 0}, {0, 0.3, 0}, 6e7}, 2, 5, {}}};
-  draw_random_scene_parts(scene_);
+  draw_random_parts(scene_);
   const auto& strokes = scene_.clutter.signs[0].strokes;
   ASSERT_GE(strokes.size(), 10U) << "each of ten letters has one or more";
   const cv::Mat1f image = rendered();
@@ -162,11 +162,11 @@ TEST_F(FrameRendererForeignLight, SignRendersSeededRandomStrokesOfItsRadiance) {
   EXPECT_GT(lit, 0.05);
   EXPECT_LT(lit, 0.6) << "dark between the strokes";
   const auto first = strokes;
-  draw_random_scene_parts(scene_);
+  draw_random_parts(scene_);
   ASSERT_EQ(strokes.size(), first.size());
   EXPECT_EQ(strokes.back().min(), first.back().min());
   scene_.seed = 2;
-  draw_random_scene_parts(scene_);
+  draw_random_parts(scene_);
   const bool same = strokes.size() == first.size() && strokes.back().min() == first.back().min() &&
                     strokes.front().min() == first.front().min();
   EXPECT_FALSE(same) << "another seed";
@@ -178,15 +178,15 @@ TEST_F(FrameRendererForeignLight, ForeignLightsInViewAreListedAsOtherLightsNotLa
       {{{-0.3, 0, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}},
       {{{5, 0, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, RectifiedSine{100, 1, 0}, {}}};
   const FrameRenderer renderer(scene_);
-  const auto lights = find_true_other_lights_in_image(scene_, renderer, shot());
+  const auto lights = list_true_lights(scene_, renderer, shot());
   ASSERT_EQ(lights.size(), 2U) << "the third is out of view";
   EXPECT_EQ(lights[0].kind, "pwm");
   EXPECT_EQ(lights[1].kind, "mains");
   EXPECT_FALSE(lights[0].lamp);
   EXPECT_NEAR(lights[0].pixel.x(), 499.5, 1e-6);
   EXPECT_EQ(lights[0].visible_fraction, 1);
-  EXPECT_EQ(find_true_lamps_in_image(scene_, renderer, shot()).size(), 1U);
-  EXPECT_EQ(make_scene_lamp_map(scene_, true).lamps.size(), 1U);
+  EXPECT_EQ(list_true_lamps(scene_, renderer, shot()).size(), 1U);
+  EXPECT_EQ(make_lamp_map(scene_, true).lamps.size(), 1U);
 }
 
 TEST_F(FrameRendererForeignLight, WriteTruthTablesListsForeignLightAndMirrorImage) {
@@ -212,7 +212,7 @@ TEST_F(FrameRendererForeignLight, WriteTruthTablesListsForeignLightAndMirrorImag
             "0000.png,pwm,,499.500000,299.500000,1\n");
 }
 
-TEST(MakeLampCaptureParameters, ForeignLightPhasesDoNotChangeOtherRandomValues) {
+TEST(MakeLampShot, ForeignLightPhasesDoNotChangeOtherRandomValues) {
   Scene scene = plain_scene();
   scene.lamps[0].phase.reset();
   CaptureSet set{"check", 5e-5, LampShots{}, {}};
@@ -222,13 +222,12 @@ TEST(MakeLampCaptureParameters, ForeignLightPhasesDoNotChangeOtherRandomValues) 
   set.lamps->yaw_jitter_rad = set.lamps->turn_rate_rad_per_s = 0;
   set.lamps->repeat = 3;
   set.lamps->interval_s = 0.25;
-  const LampShot without = make_lamp_capture_parameters(scene, set, 1);
+  const LampShot without = make_lamp_shot(scene, set, 1);
   scene.clutter.foreign_lights = {
       {{{0.3, 0, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, SquareWave{500, 0.3, 0}, {}},
       {{{0, 0.3, 1.6}, make_disc_lamp_shape(0.12), 1e9, 1}, RectifiedSine{101, 1, 0}, 0.5}};
   scene.clutter.ambient_flicker = RectifiedSine{100, 0.5, 0};
-  const LampShot with = make_lamp_capture_parameters(scene, set, 1),
-                 next = make_lamp_capture_parameters(scene, set, 2);
+  const LampShot with = make_lamp_shot(scene, set, 1), next = make_lamp_shot(scene, set, 2);
   EXPECT_EQ(with.waves.at(0).phase, without.waves.at(0).phase);
   EXPECT_EQ(with.noise_seed, without.noise_seed);
   ASSERT_EQ(with.foreign_waves.size(), 2U);

@@ -42,8 +42,7 @@ class FrameRendererDisc : public testing::TestWithParam<LensCase> {
 
   /// Returns the image of a capture, with blur and quantization.
   cv::Mat1f render_image(const FrameRenderer& renderer, const LampShot& shot) const {
-    const cv::Mat image =
-        simulate_sensor_image(scene_.sensor, renderer.render_lamps_in_electrons(shot), 1);
+    const cv::Mat image = simulate_sensor_image(scene_.sensor, renderer.render_lamps(shot), 1);
     return cv::Mat1f(image);
   }
   std::vector<Eigen::Vector2d> projected(const LampShot& shot,
@@ -62,7 +61,7 @@ class FrameRendererDisc : public testing::TestWithParam<LensCase> {
     for (const double x_m : {-0.7, -0.31, 0.003, 0.45, 0.8}) {
       for (const double y_m : {-0.6, 0.0, 0.37}) {
         const LampShot shot = shot_at(scene_, {x_m, y_m, 0.1}, 0.3 + x_m);
-        const auto lamps = find_true_lamps_in_image(scene_, renderer, shot);
+        const auto lamps = list_true_lamps(scene_, renderer, shot);
         constexpr double radius_px = 40;
         const Eigen::AlignedBox2d inside(Eigen::Vector2d(radius_px, radius_px),
                                          Eigen::Vector2d(800 - radius_px, 600 - radius_px));
@@ -108,7 +107,7 @@ TEST_P(FrameRendererDisc, CentroidBackProjectedToCeilingMatchesLampPosition) {
   const Eigen::Vector3d lamp_m = scene_.lamps[0].glow.position_m;
   for (const LampShot& shot : shots(renderer)) {
     const Eigen::Vector2d truth = projected(shot, {lamp_m})[0];
-    EXPECT_LT((find_true_lamps_in_image(scene_, renderer, shot)[0].pixel - truth).norm(), 1e-6);
+    EXPECT_LT((list_true_lamps(scene_, renderer, shot)[0].pixel - truth).norm(), 1e-6);
 
     // The weight of a pixel is the area of the ceiling that it covers.
     const cv::Mat1f image = render_image(renderer, shot);

@@ -27,7 +27,7 @@ class FrameRendererMirror : public testing::Test {
     const FrameRenderer renderer(scene_);
     LampShot shot = shot_at(scene_, {0, 0, 0.1}, 0);
     for (SquareWave& wave : shot.waves) wave = {wave.frequency_hz, duty, phase};
-    return renderer.render_lamps_in_electrons(shot);
+    return renderer.render_lamps(shot);
   }
   /// Returns the part of the image in which the pane appears.
   static cv::Mat1f behind_pane(const cv::Mat1f& image) {
@@ -37,18 +37,16 @@ class FrameRendererMirror : public testing::Test {
   }
   std::vector<TrueOtherLight> truth() const {
     const FrameRenderer renderer(scene_);
-    return find_true_other_lights_in_image(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
+    return list_true_lights(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
   }
   Scene scene_ = plain_scene();
 };
 
-TEST(MakeReflectionAboutPanel, MovesPointByTwiceItsDistanceFromPanel) {
-  const Eigen::Isometry3d reflection =
-      make_reflection_about_panel({{0.4, 5, 0}, {0, 2, 0}, {0, 0, 3}, 0});
+TEST(MakeReflection, MovesPointByTwiceItsDistanceFromPanel) {
+  const Eigen::Isometry3d reflection = make_reflection({{0.4, 5, 0}, {0, 2, 0}, {0, 0, 3}, 0});
   EXPECT_LT((reflection * Eigen::Vector3d(0.1, 2, 3) - Eigen::Vector3d(0.7, 2, 3)).norm(), 1e-12);
   EXPECT_NEAR(reflection.linear().determinant(), -1, 1e-12);
-  const Eigen::Isometry3d slanted =
-      make_reflection_about_panel({{1, 0, 0}, {-1, 1, 0}, {0, 0, 1}, 0});
+  const Eigen::Isometry3d slanted = make_reflection({{1, 0, 0}, {-1, 1, 0}, {0, 0, 1}, 0});
   EXPECT_LT((slanted * Eigen::Vector3d::Zero() - Eigen::Vector3d(1, 1, 0)).norm(), 1e-12);
 }
 
@@ -136,7 +134,7 @@ TEST_F(FrameRendererMirror, MirrorImageIsListedAsOtherLightNotAsLamp) {
   EXPECT_LT((lights[0].pixel - Eigen::Vector2d(399.5 + 500 * 0.8 / 1.5, 299.5)).norm(), 1e-6);
   EXPECT_EQ(lights[0].visible_fraction, 1);
   const FrameRenderer renderer(scene_);
-  const auto lamps = find_true_lamps_in_image(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
+  const auto lamps = list_true_lamps(scene_, renderer, shot_at(scene_, {0, 0, 0.1}, 0));
   ASSERT_EQ(lamps.size(), 1U);
   EXPECT_NEAR(lamps[0].pixel.x(), 399.5, 1e-6);
 }

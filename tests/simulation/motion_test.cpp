@@ -37,13 +37,12 @@ TEST(FrameRendererMotion, DiscSkewIsRowTimeTimesImageSpeed) {
   scene.lamps[0].glow.shape = make_disc_lamp_shape(0.3);  // 100 px
   const FrameRenderer renderer(scene);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
-  ASSERT_NEAR(fit_slope(middles(renderer.render_lamps_in_electrons(shot), 260, 80)), 0, 1e-6);
+  ASSERT_NEAR(fit_slope(middles(renderer.render_lamps(shot), 260, 80)), 0, 1e-6);
   for (const double speed_m_per_s : {0.04, 1.0, -3.0}) {
     shot.motion.velocity_m_per_s = {speed_m_per_s, 0};
     // The lamp moves in the opposite direction, by f / H = 500 / 1.5 pixels per meter.
     const double expected = -speed_m_per_s * 3e-5 * 500 / 1.5;
-    EXPECT_NEAR(fit_slope(middles(renderer.render_lamps_in_electrons(shot), 260, 80)) / expected, 1,
-                0.01);
+    EXPECT_NEAR(fit_slope(middles(renderer.render_lamps(shot), 260, 80)) / expected, 1, 0.01);
   }
 }
 
@@ -58,7 +57,7 @@ TEST(FrameRendererMotion, DiscSkewMatchesRowTimeTimesYawRate) {
   // In the level camera the lamp turns clockwise: at 100 px below the middle it moves by + 100 px
   // a radian along x; the lines between 60 and 140 below differ in both, to first order by
   // (row - 0) rate (time of the row).
-  const auto at = middles(renderer.render_lamps_in_electrons(shot), 360, 80);
+  const auto at = middles(renderer.render_lamps(shot), 360, 80);
   double expected = 0;
   {
     std::vector<double> theory;
@@ -78,14 +77,14 @@ TEST(FrameRendererMotion, TrueLampCenterMovesLikeRenderedCentroid) {
   for (const Eigen::Vector2d& velocity : {Eigen::Vector2d(2, 0), Eigen::Vector2d(-1, 2)}) {
     LampShot shot = shot_at(scene, {0.05, -0.4, 0.1}, 0.2);
     const auto offset = [&] {
-      const Brightness brightness = measure_brightness(renderer.render_lamps_in_electrons(shot));
+      const Brightness brightness = measure_brightness(renderer.render_lamps(shot));
       return Eigen::Vector2d(brightness.centroid_px -
-                             find_true_lamps_in_image(scene, renderer, shot).at(0).pixel);
+                             list_true_lamps(scene, renderer, shot).at(0).pixel);
     };
     const Eigen::Vector2d at_rest = offset();
-    const Eigen::Vector2d center = find_true_lamps_in_image(scene, renderer, shot)[0].pixel;
+    const Eigen::Vector2d center = list_true_lamps(scene, renderer, shot)[0].pixel;
     shot.motion.velocity_m_per_s = velocity;
-    EXPECT_GT((find_true_lamps_in_image(scene, renderer, shot)[0].pixel - center).norm(), 1);
+    EXPECT_GT((list_true_lamps(scene, renderer, shot)[0].pixel - center).norm(), 1);
     EXPECT_LT((offset() - at_rest).norm(), 0.01);
   }
 }
@@ -96,12 +95,12 @@ TEST(FrameRendererMotion, TotalLightIsProportionalToExposureWhileRotating) {
   scene.lamps[0].glow.position_m = {0.55, 0, 1.6};  // 183 px from the middle
   const FrameRenderer renderer(scene);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0.33);
-  const double at_rest = measure_brightness(renderer.render_lamps_in_electrons(shot)).sum;
+  const double at_rest = measure_brightness(renderer.render_lamps(shot)).sum;
   // Full rotation: lines are lit longer where the lamp moves with the readout, shorter where it
   // moves against it.
   shot.motion.turn_rate_rad_per_s = rad_from_deg(720);
   shot.exposure_s = 0.5;
-  const double smeared = measure_brightness(renderer.render_lamps_in_electrons(shot)).sum;
+  const double smeared = measure_brightness(renderer.render_lamps(shot)).sum;
   EXPECT_NEAR(smeared / at_rest, 0.5 / 5e-5, 0.5 / 5e-5 * 3e-3);
 }
 
@@ -113,7 +112,7 @@ TEST(FrameRendererMotion, LampIsSmearedUniformlyOverFullRotation) {
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
   shot.exposure_s = 1;
   shot.motion.turn_rate_rad_per_s = rad_from_deg(360);
-  const cv::Mat1f ring = renderer.render_lamps_in_electrons(shot);
+  const cv::Mat1f ring = renderer.render_lamps(shot);
   // The same light on all sides of the middle, 500 / 3 px from it.
   for (const cv::Point& at : {cv::Point(566, 300), cv::Point(233, 300), cv::Point(400, 133)}) {
     EXPECT_NEAR(ring(at) / ring(466, 400), 1, 0.02);
@@ -127,7 +126,7 @@ TEST(FrameRendererMotion, SmearVarianceMatchesDisplacementDuringExposure) {
   shot.exposure_s = 0.01;
   const FrameRenderer renderer(scene);
   const auto variance = [&] {
-    const cv::Mat1f image = renderer.render_lamps_in_electrons(shot);
+    const cv::Mat1f image = renderer.render_lamps(shot);
     const Brightness brightness = measure_brightness(image);
     double sum = 0;
     for (int v = 0; v < image.rows; ++v) {
@@ -149,11 +148,11 @@ TEST(FrameRendererMotion, TotalLightAndCentroidOfBoardAreUnchangedByMotion) {
   scene.board = plain_board();
   scene.board->surround_e_per_s = 0;
   const FrameRenderer renderer(scene);
-  BoardShot shot = make_board_capture_parameters(scene, board_views(1, 0.5, 0, 0, 0), 0);
+  BoardShot shot = make_board_shot(scene, board_views(1, 0.5, 0, 0, 0), 0);
   shot.exposure_s = 0.01;
-  const Brightness at_rest = measure_brightness(renderer.render_board_in_electrons(shot));
+  const Brightness at_rest = measure_brightness(renderer.render_board(shot));
   shot.velocity_in_camera_m_per_s = {0.01, 0, 0};
-  const Brightness moving = measure_brightness(renderer.render_board_in_electrons(shot));
+  const Brightness moving = measure_brightness(renderer.render_board(shot));
   EXPECT_NEAR(moving.sum / at_rest.sum, 1, 1e-4);
   EXPECT_LT((moving.centroid_px - at_rest.centroid_px).norm(), 0.02);
 }

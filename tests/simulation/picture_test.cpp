@@ -31,16 +31,16 @@ TEST(SimulateSensorImage, AppliesGammaToBothLevelsOfStepEdge) {
   EXPECT_EQ(image.at<std::uint8_t>(10, 20), std::lround(255 * std::pow(100 / 255.0, 1 / 2.2)));
 }
 
-TEST(ApplyToneCurveToGrayLevel, MapsBlackLevelToZeroAndClipsAtWhite) {
+TEST(ApplyToneCurve, MapsBlackLevelToZeroAndClipsAtWhite) {
   Sensor sensor = kSensor;
   sensor.black_level_dn = 15;
   const ImageProcessing picture{2, {}, {}};
-  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 15), 0);
-  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 3), 0) << "noise below it";
-  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 15 + 60), 255 * 0.5);
-  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 300), 255);
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 15), 0);
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 3), 0) << "noise below it";
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 15 + 60), 255 * 0.5);
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 300), 255);
   sensor.bits = 16;
-  EXPECT_EQ(apply_tone_curve_to_gray_level(picture, sensor, 65535), 65535);
+  EXPECT_EQ(apply_tone_curve(picture, sensor, 65535), 65535);
 }
 
 TEST(SimulateSensorImage, GammaOneGivesSameImageAsNoProcessing) {
@@ -99,11 +99,11 @@ TEST(SimulateSensorImage, BayerImageReproducesLinearGradient) {
   }
 }
 
-TEST(ApplyToneCurveAndSharpening, OvershootAtStepMatchesUnsharpMaskEquation) {
+TEST(ProcessLevels, OvershootAtStepMatchesUnsharpMaskEquation) {
   const double amount = 0.8, radius_px = 1.5, low = 50, high = 100;
   const ImageProcessing picture{1, Sharpening{amount, radius_px}, {}};
   cv::Mat1f levels = step(low, high);
-  apply_tone_curve_and_sharpening(picture, kSensor, levels);
+  process_levels(picture, kSensor, levels);
   // Next to the edge the blurred image has (1 + g) / 2 of the step, with g the kernel's largest
   // weight.
   double sum = 0;
@@ -117,58 +117,56 @@ TEST(ApplyToneCurveAndSharpening, OvershootAtStepMatchesUnsharpMaskEquation) {
 
 TEST(SimulateSensorImage, SharpensAfterToneCurveAndBeforeRounding) {
   const ImageProcessing curve{2, {}, {}}, curve_and_sharpening{2, Sharpening{1, 1}, {}};
-  const double low = apply_tone_curve_to_gray_level(curve, kSensor, 10),
-               high = apply_tone_curve_to_gray_level(curve, kSensor, 100);
+  const double low = apply_tone_curve(curve, kSensor, 10),
+               high = apply_tone_curve(curve, kSensor, 100);
   const cv::Mat image = simulate_sensor_image(kSensor, step(20, 200), 1, curve_and_sharpening);
   const ImageProcessing sharpening{1, Sharpening{1, 1}, {}};
   cv::Mat1f levels = step(low, high);
-  apply_tone_curve_and_sharpening(sharpening, kSensor, levels);
+  process_levels(sharpening, kSensor, levels);
   for (const int u : {18, 19, 20, 21}) {
     EXPECT_EQ(image.at<std::uint8_t>(10, u), std::lround(levels(10, u))) << u;
   }
 }
 
-TEST(EncodeImageAsJpegOrPng, ReturnsLosslessPngWithoutJpegQuality) {
+TEST(EncodeImage, ReturnsLosslessPngWithoutJpegQuality) {
   const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
   const cv::Mat image = simulate_sensor_image(noisy, step(50, 400), 1);
   for (const auto& picture :
        {std::optional<ImageProcessing>(), std::optional<ImageProcessing>({2.2, {}, {}})}) {
-    EXPECT_EQ(image_file_extension(picture), ".png");
-    EXPECT_TRUE(same(
-        cv::imdecode(encode_image_as_jpeg_or_png(image, picture), cv::IMREAD_UNCHANGED), image));
+    EXPECT_EQ(image_extension(picture), ".png");
+    EXPECT_TRUE(same(cv::imdecode(encode_image(image, picture), cv::IMREAD_UNCHANGED), image));
   }
 }
 
-TEST(EncodeImageAsJpegOrPng, ReturnsJpegOfGivenQuality) {
+TEST(EncodeImage, ReturnsJpegOfGivenQuality) {
   const Sensor noisy{8, 0.5, 5, 60000, 8, true, {}};
   const cv::Mat image = simulate_sensor_image(noisy, step(50, 400), 1);
   const ImageProcessing coarse{1, {}, 30}, fine{1, {}, 95};
-  EXPECT_EQ(image_file_extension(fine), ".jpg");
-  const auto bytes = encode_image_as_jpeg_or_png(image, fine);
+  EXPECT_EQ(image_extension(fine), ".jpg");
+  const auto bytes = encode_image(image, fine);
   EXPECT_EQ(bytes.at(0), 0xff);
   EXPECT_EQ(bytes.at(1), 0xd8);
-  EXPECT_EQ(encode_image_as_jpeg_or_png(image, fine), bytes);
+  EXPECT_EQ(encode_image(image, fine), bytes);
   std::vector<unsigned char> expected;
   ASSERT_TRUE(cv::imencode(".jpg", image, expected, {cv::IMWRITE_JPEG_QUALITY, 95}));
   EXPECT_EQ(bytes, expected);
-  EXPECT_GT(bytes.size(), encode_image_as_jpeg_or_png(image, coarse).size());
+  EXPECT_GT(bytes.size(), encode_image(image, coarse).size());
   const cv::Mat found = cv::imdecode(bytes, cv::IMREAD_UNCHANGED);
   EXPECT_EQ(found.type(), CV_8U);
   const double loss = cv::norm(found, image),
-               coarse_loss = cv::norm(
-                   cv::imdecode(encode_image_as_jpeg_or_png(image, coarse), cv::IMREAD_UNCHANGED),
-                   image);
+               coarse_loss =
+                   cv::norm(cv::imdecode(encode_image(image, coarse), cv::IMREAD_UNCHANGED), image);
   EXPECT_GT(loss, 0);
   EXPECT_LT(loss, 0.5 * coarse_loss);
 }
 
-TEST(MakeLampCaptureParameters, ImageNameIsPngUnlessJpegQualityIsGiven) {
+TEST(MakeLampShot, ImageNameIsPngUnlessJpegQualityIsGiven) {
   Scene scene = plain_scene();
   const LampShots captures{{0}, {{0, 0}}, {}, {0}, 0, 0, 1, 0.5, false};
   const CaptureSet set{"one", 5e-5, captures, {}};
-  EXPECT_EQ(make_lamp_capture_parameters(scene, set, 0).image, "0000.png");
+  EXPECT_EQ(make_lamp_shot(scene, set, 0).image, "0000.png");
   scene.processing = ImageProcessing{2.2, {}, 90};
-  EXPECT_EQ(make_lamp_capture_parameters(scene, set, 0).image, "0000.jpg");
+  EXPECT_EQ(make_lamp_shot(scene, set, 0).image, "0000.jpg");
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ LampShot shot_at(const Scene& scene, const Eigen::Vector3d& position_m, double y
     shot.waves.push_back({lamp.frequency_hz, lamp.duty, lamp.phase.value_or(0)});
   }
   for (const ForeignLight& light : scene.clutter.foreign_lights) {
-    shot.foreign_waves.push_back(copy_light_wave_with_phase(light.wave, light.phase.value_or(0)));
+    shot.foreign_waves.push_back(copy_with_phase(light.wave, light.phase.value_or(0)));
   }
   return shot;
 }

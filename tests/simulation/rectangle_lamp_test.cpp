@@ -69,8 +69,7 @@ TEST_P(FrameRendererRectangle, RectangleCoversItsProjectedOutline) {
       twice_area += cross_product_2d(p, q);
       moment += cross_product_2d(p, q) * (p + q) / 3;
     }
-    const cv::Mat1f image(
-        simulate_sensor_image(scene_.sensor, renderer.render_lamps_in_electrons(shot), 1));
+    const cv::Mat1f image(simulate_sensor_image(scene_.sensor, renderer.render_lamps(shot), 1));
     const Brightness rendered = measure_brightness(image);
     EXPECT_LT((rendered.centroid_px - moment / twice_area).norm(), 0.001);
     const double level = glow.electron_rate_e_per_s * shot.exposure_s;
@@ -95,7 +94,7 @@ TEST_P(FrameRendererRectangle, RectangleCoversItsProjectedOutline) {
 TEST_P(FrameRendererRectangle, TrueLampPixelIsProjectedRectangleCenter) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {0.35, -0.2, 0.1}, 0.4);
-  const auto truth = find_true_lamps_in_image(scene_, renderer, shot);
+  const auto truth = list_true_lamps(scene_, renderer, shot);
   ASSERT_EQ(truth.size(), 1U);
   EXPECT_EQ(truth[0].visible_fraction, 1);
   const auto center = projected(shot, {scene_.lamps[0].glow.position_m})[0];
@@ -105,7 +104,7 @@ TEST_P(FrameRendererRectangle, TrueLampPixelIsProjectedRectangleCenter) {
 TEST_P(FrameRendererRectangle, VisibleFractionIsBetweenZeroAndOneAtImageEdge) {
   const FrameRenderer renderer(scene_);
   const LampShot shot = shot_at(scene_, {1.2, 0, 0.1}, 0);
-  const auto truth = find_true_lamps_in_image(scene_, renderer, shot);
+  const auto truth = list_true_lamps(scene_, renderer, shot);
   ASSERT_EQ(truth.size(), 1U);
   EXPECT_GT(truth[0].visible_fraction, 0);
   EXPECT_LT(truth[0].visible_fraction, 1);

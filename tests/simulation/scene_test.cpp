@@ -136,7 +136,7 @@ TEST(ReadSceneFile, ReadsPivotsHeightsAndYawsInOrderOfFile) {
   EXPECT_EQ(set.lamps->interval_s, 0.5);
   EXPECT_EQ(set.lamps->turn_rate_rad_per_s, 0);
   EXPECT_TRUE(set.lamps->has_known_positions);
-  EXPECT_EQ(count_captures_of_set(set), 2U * 2 * 2 * 3);
+  EXPECT_EQ(count_shots(set), 2U * 2 * 2 * 3);
 }
 
 TEST(ReadSceneFile, OrdersPivotsOfGridRowByRow) {
@@ -175,7 +175,7 @@ TEST(ReadSceneFile, ReturnsEquidistantDrivePositionsUpToItsEnd) {
 TEST(ReadSceneFile, ReadsLimitsOfBoardViews) {
   const CaptureSet set = read_scene_text(kSceneYaml).sets.at(3);
   EXPECT_FALSE(set.lamps);
-  EXPECT_EQ(count_captures_of_set(set), 5U);
+  EXPECT_EQ(count_shots(set), 5U);
   ASSERT_TRUE(set.board);
   EXPECT_EQ(set.board->distance_m, std::pair(0.2, 0.4));
   EXPECT_NEAR(set.board->tilt_rad, std::numbers::pi / 4, kRounding);

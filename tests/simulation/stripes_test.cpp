@@ -19,9 +19,9 @@ std::vector<double> lit_lines(Scene scene, double frequency_hz, double duty, dou
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
   shot.exposure_s = exposure_s;
   const FrameRenderer renderer(scene);
-  const cv::Mat1f always = renderer.render_lamps_in_electrons(shot);
+  const cv::Mat1f always = renderer.render_lamps(shot);
   shot.waves[0] = {frequency_hz, duty, 0.123};
-  const cv::Mat1f switched = renderer.render_lamps_in_electrons(shot);
+  const cv::Mat1f switched = renderer.render_lamps(shot);
   const int middle = always.cols / 2;
   std::vector<double> lit;
   for (int line = 110; line < 490; ++line) {
@@ -103,9 +103,9 @@ TEST(FrameRenderer, RowBrightnessIsLitFractionOfRowExposure) {
   scene.lamps[0].glow.shape = make_disc_lamp_shape(1.2);
   LampShot shot = shot_at(scene, {0, 0, 0.1}, 0);
   const FrameRenderer renderer(scene);
-  const cv::Mat1f always = renderer.render_lamps_in_electrons(shot);
+  const cv::Mat1f always = renderer.render_lamps(shot);
   shot.waves[0] = {1000, 0.5, 0};
-  const cv::Mat1f switched = renderer.render_lamps_in_electrons(shot);
+  const cv::Mat1f switched = renderer.render_lamps(shot);
   for (int line = 200; line < 400; ++line) {
     const double middle_s = (line - 299.5) * 3e-5;
     constexpr int steps = 5000;
@@ -125,7 +125,7 @@ TEST(FrameRenderer, ElectronImageIsTransposedForColumnReadout) {
   scene.lamps[0].frequency_hz = 3000;
   const FrameRenderer renderer(scene);
   // Lines of the electrons are columns of the image.
-  const cv::Mat1f electrons = renderer.render_lamps_in_electrons(shot_at(scene, {0, 0, 0.1}, 0));
+  const cv::Mat1f electrons = renderer.render_lamps(shot_at(scene, {0, 0, 0.1}, 0));
   EXPECT_EQ(electrons.size(), cv::Size(600, 800));
   const Brightness brightness = measure_brightness(electrons);
   EXPECT_NEAR(brightness.centroid_px.y(), 402.3, 6);

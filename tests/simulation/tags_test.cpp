@@ -46,10 +46,10 @@ void expect_all_read(const Scene& scene, apriltag_family_t* family) {
   const FrameRenderer renderer(scene);
   const CaptureSet views = board_views(4, 0.28, rad_from_deg(35), rad_from_deg(180), 0);
   for (std::size_t index = 0; index < 4; ++index) {
-    const BoardShot shot = make_board_capture_parameters(scene, views, index);
-    const Corners found = detected(
-        simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), 1), family);
-    const auto truth = project_scene_corners_into_image(scene, renderer, shot);
+    const BoardShot shot = make_board_shot(scene, views, index);
+    const Corners found =
+        detected(simulate_sensor_image(scene.sensor, renderer.render_board(shot), 1), family);
+    const auto truth = list_true_corners(scene, renderer, shot);
     ASSERT_FALSE(truth.empty());
     EXPECT_EQ(found.size(), truth.size());
     for (const auto& [tag, corner, pixel] : truth) {

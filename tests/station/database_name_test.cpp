@@ -33,28 +33,28 @@ struct DatabaseIdentity : testing::Test {
   std::string here;
 };
 
-TEST(ContainsDatabasePassword, FindsEachSecretOfLibpqAndEncodedOnes) {
+TEST(ContainsPassword, FindsEachSecretOfLibpqAndEncodedOnes) {
   for (const char* where :
        {"postgresql://u:secret@db/vlp", "postgresql://u:%73ecret@db/vlp",
         "postgresql://u%3Asecret@db/vlp", "postgresql://u@db/vlp?password=secret",
         "postgresql://u@db/vlp?p%61ssword=secret", "postgresql://u@db/vlp?sslpassword=secret",
         "postgresql://u@db/vlp?options=-c%20password%3Dsecret",
         "dbname=postgresql://u:secret@db/vlp"}) {
-    EXPECT_TRUE(contains_database_password(where)) << where;
+    EXPECT_TRUE(contains_password(where)) << where;
   }
   for (const char* where : {"postgresql://u@db/vlp", "postgresql://db:5433/vlp?sslmode=require",
                             "postgresql:///vlp?passfile=/etc/vlp/pass", "records.db"}) {
-    EXPECT_FALSE(contains_database_password(where)) << where;
+    EXPECT_FALSE(contains_password(where)) << where;
   }
 }
 
 TEST_F(DatabaseIdentity, IsMachineAndNormalizedPathForFile) {
-  EXPECT_EQ(derive_database_identity("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
-  EXPECT_EQ(derive_database_identity("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
+  EXPECT_EQ(derive_identity("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
+  EXPECT_EQ(derive_identity("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
 }
 
 TEST_F(DatabaseIdentity, DiffersForDifferentServersAndDatabasesOnly) {
-  const auto of = [](const std::string& where) { return derive_database_identity(where); };
+  const auto of = [](const std::string& where) { return derive_identity(where); };
   EXPECT_EQ(of("postgresql://u@db/vlp"), "postgresql://db/vlp");
   EXPECT_EQ(of("postgres://other:secret@db:5432/vlp?connect_timeout=2"), of("postgresql://db/vlp"));
   EXPECT_NE(of("postgresql://db:5433/vlp"), of("postgresql://db/vlp"));
@@ -73,17 +73,16 @@ TEST_F(DatabaseIdentity, IncludesMachineForLocalServer) {
   for (const char* where :
        {"postgresql:///vlp", "postgresql://localhost/vlp", "postgresql://127.0.0.1:5544/vlp",
         "postgresql:///vlp?host=/run/postgresql", "postgresql://db/vlp?hostaddr=127.0.0.1"}) {
-    EXPECT_THAT(derive_database_identity(where), StartsWith(here + "postgresql://")) << where;
+    EXPECT_THAT(derive_identity(where), StartsWith(here + "postgresql://")) << where;
   }
-  EXPECT_THAT(derive_database_identity("postgresql:///vlp?hostaddr=10.0.0.1"),
-              Not(StartsWith(here)));
+  EXPECT_THAT(derive_identity("postgresql:///vlp?hostaddr=10.0.0.1"), Not(StartsWith(here)));
 }
 
 TEST_F(DatabaseIdentity, ContainsNoPassword) {
   for (const char* where : {"postgresql://u:secret@db", "postgresql://u@db/vlp?password=secret"}) {
-    EXPECT_THAT(derive_database_identity(where), Not(HasSubstr("secret")));
+    EXPECT_THAT(derive_identity(where), Not(HasSubstr("secret")));
   }
-  EXPECT_THAT(rejection_message([] { derive_database_identity("postgresql://u:a@secret@/db"); }),
+  EXPECT_THAT(rejection_message([] { derive_identity("postgresql://u:a@secret@/db"); }),
               testing::AllOf(HasSubstr("is not of the form"), Not(HasSubstr("secret"))));
 }
 

@@ -29,9 +29,9 @@ inline RunRecord make_sample_record(const std::string& run, const std::string& c
   record.libraries = "none";
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\ncamera: {id: \"it's\"}\n";
-  record.metrics = check_all_metrics_against_gates(
-      {{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
-      {{"rms_px", rms_px}, {"coverage", 0.75}}, list_unit_metric_kinds());
+  record.metrics =
+      check_against_gates({{"rms_px", 1, GuardBand{0.1 + 0.2, 1.5}}, {"tilt_deg", 2}},
+                          {{"rms_px", rms_px}, {"coverage", 0.75}}, list_unit_metrics());
   record.images = {{"boards", "0000.png", std::string(64, 'b'), ""},
                    {"check", "0000.png", std::string(64, 'c'), "too dark"}};
   return record;

@@ -63,8 +63,8 @@ TEST_F(ReadStationConfig, AcceptsOptionalKeysOfExampleWhenUncommented) {
   EXPECT_THAT(config.golden_unit->gates, SizeIs(7));
   ASSERT_TRUE(config.verification_interval);
   EXPECT_EQ(config.verification_interval->units, 200);
-  EXPECT_EQ(describe_serial_number_problem(config, "0001"), "");
-  EXPECT_NE(describe_serial_number_problem(config, "x1"), "");
+  EXPECT_EQ(describe_serial_problem(config, "0001"), "");
+  EXPECT_NE(describe_serial_problem(config, "x1"), "");
   EXPECT_EQ(config.void_operators, (std::vector<std::string>{"Ann", "Bea"}));
   ASSERT_TRUE(config.hook);
   EXPECT_THAT(config.hook->command, SizeIs(3));
@@ -178,27 +178,26 @@ TEST_F(ReadStationConfig, RejectsInvalidValues) {
 
 TEST_F(ReadStationConfig, SerialPatternRestrictsAcceptedSerials) {
   StationConfig config = read_station_config(folder / "station.yaml");
-  EXPECT_EQ(describe_serial_number_problem(config, "anything"), "");
-  EXPECT_THAT(describe_serial_number_problem(config, "a/b"),
-              HasSubstr("a camera's id has letters"));
+  EXPECT_EQ(describe_serial_problem(config, "anything"), "");
+  EXPECT_THAT(describe_serial_problem(config, "a/b"), HasSubstr("a camera's id has letters"));
   change("station.yaml", "records: records.db",
          "records: records.db\nserial_pattern: 'SN-[0-9]{4}'");
   config = read_station_config(folder / "station.yaml");
-  EXPECT_EQ(describe_serial_number_problem(config, "SN-0123"), "");
-  EXPECT_EQ(describe_serial_number_problem(config, "SN-01234"),
+  EXPECT_EQ(describe_serial_problem(config, "SN-0123"), "");
+  EXPECT_EQ(describe_serial_problem(config, "SN-01234"),
             "'SN-01234' is not of the form SN-[0-9]{4}");
-  EXPECT_THAT(describe_serial_number_problem(config, ""), HasSubstr("a camera's id has letters"));
+  EXPECT_THAT(describe_serial_problem(config, ""), HasSubstr("a camera's id has letters"));
 }
 
 /// Nested repetitions can match in exponentially many combinations.
-TEST(DescribeSerialNumberProblem, ReportsPatternWhoseComparisonIsTooSlow) {
+TEST(DescribeSerialProblem, ReportsPatternWhoseComparisonIsTooSlow) {
   StationConfig config{};
   config.serial_pattern = "(a+)+b";
-  EXPECT_EQ(describe_serial_number_problem(config, "aaab"), "");
-  EXPECT_THAT(describe_serial_number_problem(config, std::string(60, 'a')),
+  EXPECT_EQ(describe_serial_problem(config, "aaab"), "");
+  EXPECT_THAT(describe_serial_problem(config, std::string(60, 'a')),
               HasSubstr("serial_pattern: the comparison is too slow for"));
   config.serial_pattern = "[A-Za-z0-9_.-]{1,64}";
-  EXPECT_EQ(describe_serial_number_problem(config, std::string(64, 'a')), "");
+  EXPECT_EQ(describe_serial_problem(config, std::string(64, 'a')), "");
 }
 
 TEST_F(ReadStationConfig, DigestChangesWithReferencedFile) {

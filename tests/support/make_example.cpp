@@ -33,7 +33,7 @@ constexpr double kNoise_px = 0.05;
 Frame make_frame(const SyntheticRig& rig, const char* name, int number, Random& random) {
   std::array<char, 32> image{};
   std::snprintf(image.data(), image.size(), "%s_%02d.png", name, number);
-  const auto visible = find_visible_lamps(rig.map, rig.calibration.camera, rig.camera);
+  const auto visible = list_visible_positions(rig.map, rig.calibration.camera, rig.camera);
   auto detections = seen_from(rig, kNoise_px);
   std::erase_if(detections, [&](const Detection& detection) {
     const auto& lamp = rig.map.lamps[static_cast<std::size_t>(detection.lamp - 1)];

@@ -21,7 +21,7 @@ Camera synthetic_camera() {
 
 Camera splined_camera() {
   Camera camera = synthetic_camera();
-  camera.lens_model = lens_model_for_spline_grid({3, 12, 10, 130});
+  camera.lens_model = splined_lens_model({3, 12, 10, 130});
   camera.intrinsics.resize(4);
   camera.intrinsics.resize(num_lens_parameters(camera.lens_model));
   for (std::size_t i = 4; i < camera.intrinsics.size(); ++i) {

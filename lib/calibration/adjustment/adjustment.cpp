@@ -52,7 +52,7 @@ struct AssembledProblem {
   bool noise_is_stated = true;
 };
 
-Eigen::Vector3d compute_mean_position(const LampMap& map) {
+Eigen::Vector3d compute_centroid(const LampMap& map) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Lamp& lamp : map.lamps) sum += lamp.position_m - map.lamps.front().position_m;
   return map.lamps.front().position_m + sum / static_cast<double>(map.lamps.size());
@@ -78,10 +78,10 @@ std::optional<Pose> estimate_rough_pose(const std::vector<LampObservation>& sigh
   const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
   const BodyPrior level_at_rest;
   const BodyProblem problem{no_arm_m, level_at_rest};
-  // Before estimate_body_state_robust(), which removes lamps from the frame.
-  const BodySolution all = estimate_body_state_from_all_lamps(frame, problem);
+  // Before estimate_robust(), which removes lamps from the frame.
+  const BodySolution all = estimate_from_all(frame, problem);
   if (sightings.size() > 3) {
-    const BodySolution most = estimate_body_state_robust(frame, problem, max_residual_fraction);
+    const BodySolution most = estimate_robust(frame, problem, max_residual_fraction);
     if (most.status == FixStatus::ok) return most.fix.state.pose;
   }
   return all.status == FixStatus::ok ? std::optional(all.fix.state.pose) : std::nullopt;
@@ -119,7 +119,7 @@ Eigen::MatrixXd make_gauge(const std::vector<Eigen::Vector3d>& lamps_m,
 }
 
 /// Returns the derivative of a pixel of the undistorted image with respect to the pixel of the ray.
-Eigen::Matrix2d d_undistorted_pixel_d_pixel(const Lens& lens, const Lens::Ray& ray) {
+Eigen::Matrix2d d_ideal_d_pixel(const Lens& lens, const Lens::Ray& ray) {
   const Eigen::Vector2d z = ray.direction.hnormalized();
   return lens.focal_px().asDiagonal() *
          (ray.d_direction_d_pixel.topRows<2>() - z * ray.d_direction_d_pixel.row(2)) /
@@ -151,15 +151,15 @@ class ProblemAssembler {
         num_captures_(pivots_.size(), 0) {
     problem_.is_zenith_exact = input.zenith_is_exact;
     set_lamps();
-    set_tilt_and_lever_arm();
+    set_tilt_and_arm();
   }
 
   /// Adds a capture with its known position; counts it as rejected if it determines no pose.
-  void add_capture_or_count_as_rejected(std::size_t input_index) {
+  void add_or_reject_capture(std::size_t input_index) {
     const AdjustmentCapture& capture = input_.captures[input_index];
     const Eigen::Matrix3d level_from_base =
         level_rotation_from_inclination(capture.inclination.value_or(Inclination{0, 0}));
-    CaptureLamps lamps = find_lamps(capture, level_from_base);
+    CaptureLamps lamps = resolve_lamps(capture, level_from_base);
     auto pose = capture.initial_pose;
     if (pose) {
       pose->position_m -= all_.origin_m;
@@ -172,7 +172,7 @@ class ProblemAssembler {
     }
     const std::size_t index = problem_.captures.size();
     all_.capture_indices.push_back(input_index);
-    problem_.add_capture_with_initial_pose(
+    problem_.add_capture(
         {add_to_pivot(capture, *pose), level_from_base.transpose(), capture.motion}, *pose);
     for (auto& term : lamps.terms) {
       term.capture = index;
@@ -193,7 +193,7 @@ class ProblemAssembler {
     if (input_.map_prior != MapPrior::survey)
       problem_.gauge = make_gauge(lamps_m_, all_.lamp_seen, input_);
     for (std::size_t i = 0; i < sums_m_.size(); ++i) {
-      problem_.state_vector().segment<3>(problem_.state_vector_layout().pivot_state_index(i)) =
+      problem_.state_vector().segment<3>(problem_.layout().pivot_state_index(i)) =
           sums_m_[i] / std::max(1, num_captures_[i]);
     }
     return std::move(all_);
@@ -215,14 +215,14 @@ class ProblemAssembler {
         AdjustmentProblem(camera.lens_model,
                           LensParametrization(camera, report ? report->covariance : std::nullopt),
                           input.lamps.lamps.size(), pivots),
-        compute_mean_position(input.lamps)};
+        compute_centroid(input.lamps)};
   }
 
   void set_lamps() {
     for (const Lamp& lamp : input_.lamps.lamps) {
       lamps_m_.emplace_back(lamp.position_m - all_.origin_m);
-      problem_.state_vector().segment<3>(
-          problem_.state_vector_layout().lamp_state_index(lamps_m_.size() - 1)) = lamps_m_.back();
+      problem_.state_vector().segment<3>(problem_.layout().lamp_state_index(lamps_m_.size() - 1)) =
+          lamps_m_.back();
       problem_.lamps.push_back(
           {lamps_m_.back(), input_.map_prior == MapPrior::frame ? kInfinite : lamp.sd_m.value_or(0),
            input_.map_prior == MapPrior::heights});
@@ -230,21 +230,21 @@ class ProblemAssembler {
     all_.lamp_seen.resize(lamps_m_.size());
   }
 
-  void set_tilt_and_lever_arm() {
+  void set_tilt_and_arm() {
     Eigen::Vector2d zenith(0, 0);
     if (const auto& center = input_.calibration.rotation_center) {
-      zenith = compute_normalized_zenith_point(*center);
+      zenith = compute_zenith_point(*center);
       lever_arm_m_ = center->lever_arm_m.value_or(lever_arm_m_);
     }
-    problem_.state_vector().segment<2>(problem_.state_vector_layout().zenith) = zenith;
-    problem_.state_vector().segment<2>(problem_.state_vector_layout().lever_arm) = lever_arm_m_;
-    base_from_camera_ = rotate_level_point_to_camera(zenith, Eigen::Vector3d::UnitZ())
-                            .camera_from_level.transpose();
+    problem_.state_vector().segment<2>(problem_.layout().zenith) = zenith;
+    problem_.state_vector().segment<2>(problem_.layout().lever_arm) = lever_arm_m_;
+    base_from_camera_ =
+        rotate_to_camera(zenith, Eigen::Vector3d::UnitZ()).camera_from_level.transpose();
   }
 
   /// Returns the first detection of each lamp above the camera, at most kMaxSightings.
-  CaptureLamps find_lamps(const AdjustmentCapture& capture,
-                          const Eigen::Matrix3d& level_from_base) {
+  CaptureLamps resolve_lamps(const AdjustmentCapture& capture,
+                             const Eigen::Matrix3d& level_from_base) {
     CaptureLamps found;
     for (const Detection& detection : capture.detections) {
       const Lamp* lamp = find_lamp_by_id(input_.lamps.lamps, detection.lamp);
@@ -258,11 +258,10 @@ class ProblemAssembler {
       if (!detection.sigma_px) all_.noise_is_stated = false;
       Eigen::Matrix2d whitening = Eigen::Matrix2d::Identity() / sigma_px;
       if (input_.weighs_in_undistorted_image && !detection.sigma_px && ray->direction.z() > 0) {
-        whitening = d_undistorted_pixel_d_pixel(lens_, *ray);
+        whitening = d_ideal_d_pixel(lens_, *ray);
       }
-      found.terms.push_back(
-          {0, index, detection.pixel, sigma_px, whitening,
-           row_clock_ ? row_clock_->compute_pixel_readout_time_s(detection.pixel) : 0});
+      found.terms.push_back({0, index, detection.pixel, sigma_px, whitening,
+                             row_clock_ ? row_clock_->compute_readout_time_s(detection.pixel) : 0});
       found.indices.push_back(index);
       found.sightings.push_back(make_level_observation(
           lamps_m_[index], level.hnormalized(), Eigen::Matrix2d(lens_.focal_px().asDiagonal()), 1));
@@ -320,20 +319,19 @@ class ProblemAssembler {
   std::map<PlaceKey, std::size_t> place_of_key_;
 };
 
-AssembledProblem assemble_adjustment_problem(const AdjustmentInput& input) {
+AssembledProblem assemble_problem(const AdjustmentInput& input) {
   ProblemAssembler assembler(input);
-  for (std::size_t i = 0; i < input.captures.size(); ++i)
-    assembler.add_capture_or_count_as_rejected(i);
+  for (std::size_t i = 0; i < input.captures.size(); ++i) assembler.add_or_reject_capture(i);
   return std::move(assembler).finish();
 }
 
 /// Returns the norms of the whitened residuals; infinite if the lens cannot project the point.
-std::vector<double> compute_residual_norms(const AdjustmentProblem& problem) {
+std::vector<double> list_residual_norms(const AdjustmentProblem& problem) {
   std::vector<double> lengths;
   lengths.reserve(problem.sightings.size());
   const auto lens = problem.current_lens();
   for (const auto& sighting : problem.sightings) {
-    const auto at = lens ? problem.linearize_lamp_observation(sighting, *lens) : std::nullopt;
+    const auto at = lens ? problem.linearize_sighting(sighting, *lens) : std::nullopt;
     lengths.push_back(at ? at->value.norm() : kInfinite);
   }
   return lengths;
@@ -344,7 +342,7 @@ std::vector<double> compute_residual_norms(const AdjustmentProblem& problem) {
 /// outlier also changes the residuals of other detections. Returns true if the set of used
 /// detections changes.
 bool update_inliers(AdjustmentProblem& problem, bool noise_is_stated, double degrees_of_freedom) {
-  const std::vector<double> lengths = compute_residual_norms(problem);
+  const std::vector<double> lengths = list_residual_norms(problem);
   std::vector<double> squares;
   double worst = 0;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
@@ -354,8 +352,8 @@ bool update_inliers(AdjustmentProblem& problem, bool noise_is_stated, double deg
   }
   if (squares.empty()) return false;
   const double scatter =
-      std::sqrt(estimate_robust_variance_2d(std::move(squares), degrees_of_freedom) *
-                compute_squared_outlier_bound_2d(kDetectionOutlierSigmas, degrees_of_freedom));
+      std::sqrt(estimate_variance_2d(std::move(squares), degrees_of_freedom) *
+                compute_outlier_bound_2d(kDetectionOutlierSigmas, degrees_of_freedom));
   const double limit =
       std::max(scatter, kDetectionOutlierSigmas *
                             (noise_is_stated ? 1 : kMinNoise_px / problem.noise_scale));
@@ -370,26 +368,24 @@ bool update_inliers(AdjustmentProblem& problem, bool noise_is_stated, double deg
 
 /// Computes the residuals of the known positions, adjusted minus measured, as means over their
 /// captures.
-void compute_reference_position_residuals(AssembledProblem& all) {
+void set_place_residuals(AssembledProblem& all) {
   for (auto& place : all.known_positions) place.residual_m.setZero();
   for (const auto& seen : all.problem.position_observations) {
     auto& place = all.known_positions[seen.known_position];
     place.residual_m.head(seen.size) +=
-        (all.problem.predict_camera_or_axis_position(seen) - seen.measured_m).head(seen.size) /
-        place.captures;
+        (all.problem.predict_position(seen) - seen.measured_m).head(seen.size) / place.captures;
   }
 }
 
-double compute_normalized_residual(const AssembledProblem& all, std::size_t place) {
+double normalize_residual(const AssembledProblem& all, std::size_t place) {
   return all.known_positions[place].residual_m.norm() / all.position_sd_m[place];
 }
 
 /// Returns the squared correction r of a lamp, adjusted minus surveyed, normalized by its expected
 /// covariance: r' (sd^2 - C)^-1 r if the survey is used, r' (sd^2 + C)^-1 r if it is not.
-double compute_normalized_survey_correction(const AdjustmentProblem& problem,
-                                            const Eigen::MatrixXd& covariance, std::size_t lamp,
-                                            double sd_m, bool counts) {
-  const Eigen::Index at = problem.state_vector_layout().lamp_state_index(lamp);
+double normalize_correction(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                            std::size_t lamp, double sd_m, bool counts) {
+  const Eigen::Index at = problem.layout().lamp_state_index(lamp);
   const Eigen::Vector3d r_m =
       problem.state_vector().segment<3>(at) - problem.lamps[lamp].surveyed_m;
   const Eigen::Matrix3d found = covariance.block<3, 3>(at, at);
@@ -421,35 +417,34 @@ class Contradictions {
   const std::vector<bool>& is_lamp_moved() const { return moved_; }
   /// Returns true if most lamps contradict their survey, so that the moved ones cannot be
   /// identified.
-  bool has_contradicting_majority() const { return has_contradicting_majority_; }
+  bool has_majority() const { return has_contradicting_majority_; }
   double expected_lamp_sd_m(std::size_t lamp) const { return sd_m_[lamp]; }
 
   /// Rejects everything far from the robust solution, which outliers do not bias.
-  void reject_far_observations() {
+  void reject_far() {
     constexpr double max_sigmas = 8;  // standard deviations
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
       const Eigen::Vector3d& surveyed_m = all_.problem.lamps[i].surveyed_m;
-      const Eigen::Vector3d found_m = all_.problem.state_vector().segment<3>(
-          all_.problem.state_vector_layout().lamp_state_index(i));
+      const Eigen::Vector3d found_m =
+          all_.problem.state_vector().segment<3>(all_.problem.layout().lamp_state_index(i));
       if (all_.lamp_seen[i] && sd_m_[i] > 0 &&
           (found_m - surveyed_m).norm() > max_sigmas * sd_m_[i]) {
-        stop_using_surveyed_position(i);
+        release_lamp(i);
       }
     }
-    compute_reference_position_residuals(all_);
+    set_place_residuals(all_);
     for (std::size_t i = 0; i < all_.known_positions.size(); ++i) {
-      all_.problem.is_known_position_used[i] =
-          compute_normalized_residual(all_, i) <= kMaxPlaceSigmas;
+      all_.problem.is_known_position_used[i] = normalize_residual(all_, i) <= kMaxPlaceSigmas;
     }
   }
 
   /// Rejects the worst lamp or known position, or reinstates one that no longer contradicts the
   /// solution. Returns true if anything changes.
   bool refine(const Eigen::MatrixXd& covariance) {
-    compute_reference_position_residuals(all_);
+    set_place_residuals(all_);
     for (std::size_t i = 0; i < all_.known_positions.size(); ++i) {
       if (reinstated_places_.contains(i) || all_.problem.is_known_position_used[i]) continue;
-      if (compute_normalized_residual(all_, i) > kMaxPlaceSigmas) continue;
+      if (normalize_residual(all_, i) > kMaxPlaceSigmas) continue;
       reinstated_places_.insert(i);
       all_.problem.is_known_position_used[i] = true;
       return true;
@@ -457,9 +452,8 @@ class Contradictions {
     std::size_t worst_place = all_.known_positions.size();
     double worst = kMaxPlaceSigmas;
     for (std::size_t i = 0; i < all_.known_positions.size(); ++i) {
-      if (!all_.problem.is_known_position_used[i] || compute_normalized_residual(all_, i) <= worst)
-        continue;
-      worst = compute_normalized_residual(all_, i);
+      if (!all_.problem.is_known_position_used[i] || normalize_residual(all_, i) <= worst) continue;
+      worst = normalize_residual(all_, i);
       worst_place = i;
     }
     if (worst_place < all_.known_positions.size()) {
@@ -470,8 +464,7 @@ class Contradictions {
     double worst_chi = kMovedChiSquared;
     for (std::size_t i = 0; i < sd_m_.size(); ++i) {
       if (!all_.lamp_seen[i] || !(sd_m_[i] > 0) || std::isinf(sd_m_[i])) continue;
-      const double chi =
-          compute_normalized_survey_correction(all_.problem, covariance, i, sd_m_[i], !moved_[i]);
+      const double chi = normalize_correction(all_.problem, covariance, i, sd_m_[i], !moved_[i]);
       if (moved_[i] && chi < kMovedChiSquared && !reinstated_.contains(i)) {
         reinstated_.insert(i);
         moved_[i] = false;
@@ -491,12 +484,12 @@ class Contradictions {
       moved_.assign(moved_.size(), false);
       return true;
     }
-    stop_using_surveyed_position(worst_lamp);
+    release_lamp(worst_lamp);
     return true;
   }
 
  private:
-  void stop_using_surveyed_position(std::size_t lamp) {
+  void release_lamp(std::size_t lamp) {
     moved_[lamp] = true;
     all_.problem.lamps[lamp].sd_m = kInfinite;
   }
@@ -510,7 +503,7 @@ class Contradictions {
 
 /// Returns the square root of the variance factor of the detections: their RMS whitened residual.
 double compute_noise_ratio(const AdjustmentProblem& problem, double degrees_of_freedom) {
-  const std::vector<double> lengths = compute_residual_norms(problem);
+  const std::vector<double> lengths = list_residual_norms(problem);
   double squares = 0;
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     if (problem.sightings[i].used) squares += lengths[i] * lengths[i];
@@ -526,7 +519,7 @@ std::optional<AdjustmentProblem::GlobalCovariance> refine_adjustment(
   constexpr int max_iterations = 40;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!problem.solve_adjustment(false)) return std::nullopt;
-    const auto found = problem.compute_global_unknowns_covariance();
+    const auto found = problem.compute_covariance();
     const double ratio = compute_noise_ratio(problem, found.degrees_of_freedom);
     bool changed = update_inliers(problem, all.noise_is_stated, found.degrees_of_freedom);
     if (!changed) changed = contradictions.refine(found.matrix);
@@ -543,29 +536,29 @@ std::optional<AdjustmentProblem::GlobalCovariance> refine_adjustment(
     if (!changed) return found;
   }
   if (!problem.solve_adjustment(false)) return std::nullopt;
-  return problem.compute_global_unknowns_covariance();
+  return problem.compute_covariance();
 }
 
 /// Returns the covariance for equal noise in the image, and estimates that noise. The estimates
 /// keep the weights that they were solved with.
-Eigen::MatrixXd compute_covariance_for_image_noise(AssembledProblem& all) {
+Eigen::MatrixXd compute_noise_covariance(AssembledProblem& all) {
   AdjustmentProblem& problem = all.problem;
   for (auto& sighting : problem.sightings) {
     sighting.whitening = Eigen::Matrix2d::Identity() / sighting.sigma_px;
   }
   const double ratio =
-      compute_noise_ratio(problem, problem.compute_global_unknowns_covariance().degrees_of_freedom);
+      compute_noise_ratio(problem, problem.compute_covariance().degrees_of_freedom);
   problem.noise_scale = std::max(problem.noise_scale * ratio, kMinNoise_px);
-  return problem.compute_global_unknowns_covariance().matrix;
+  return problem.compute_covariance().matrix;
 }
 
 std::string explain_undetermined(const AdjustmentProblem& problem,
                                  const Eigen::MatrixXd& covariance, double height_m,
                                  const AdjustmentLimits& limits, bool& has_lever_arm) {
-  const AdjustmentLayout& at = problem.state_vector_layout();
+  const UnknownIndices& at = problem.layout();
   const auto compute_max_sd = [&](Eigen::Index first) {
     const Eigen::Matrix2d block = covariance.block<2, 2>(first, first);
-    return std::sqrt(eigendecompose_symmetric_matrix(block).values.maxCoeff());
+    return std::sqrt(eigendecompose(block).values.maxCoeff());
   };
   const bool zenith = compute_max_sd(at.zenith) <= limits.zenith_rad;
   has_lever_arm =
@@ -590,9 +583,9 @@ bool solve_robustly(AssembledProblem& all, Contradictions& contradictions) {
   problem.noise_scale = 1;
   is_solved = is_solved && problem.solve_adjustment(true);
   if (!is_solved) return false;
-  contradictions.reject_far_observations();
+  contradictions.reject_far();
   // The loss assumes a noise of 1 px if none is stated, and outliers bias its solution by less.
-  update_inliers(problem, true, problem.compute_global_unknowns_covariance().degrees_of_freedom);
+  update_inliers(problem, true, problem.compute_covariance().degrees_of_freedom);
   return true;
 }
 
@@ -601,21 +594,21 @@ bool solve_robustly(AssembledProblem& all, Contradictions& contradictions) {
 std::optional<AdjustmentProblem::GlobalCovariance> solve_all_stages(
     const AdjustmentInput& input, AssembledProblem& all, Contradictions& contradictions) {
   // A misidentified lamp may be at a point that the lens cannot project.
-  const std::vector<double> initial_norms = compute_residual_norms(all.problem);
+  const std::vector<double> initial_norms = list_residual_norms(all.problem);
   for (std::size_t i = 0; i < initial_norms.size(); ++i) {
     all.problem.sightings[i].used = initial_norms[i] < kInfinite;
   }
   if (!input.captures_are_checked && !solve_robustly(all, contradictions)) return std::nullopt;
   auto adjusted = refine_adjustment(all, contradictions);
   if (adjusted && input.weighs_in_undistorted_image && !all.noise_is_stated) {
-    adjusted->matrix = compute_covariance_for_image_noise(all);
+    adjusted->matrix = compute_noise_covariance(all);
   }
   return adjusted;
 }
 
 /// Returns the mean height above the camera of the lamps used.
 double compute_mean_height_m(const AdjustmentProblem& problem) {
-  const AdjustmentLayout& at = problem.state_vector_layout();
+  const UnknownIndices& at = problem.layout();
   const Eigen::VectorXd& state = problem.state_vector();
   double sum_m = 0;
   int count = 0;
@@ -631,12 +624,12 @@ double compute_mean_height_m(const AdjustmentProblem& problem) {
 
 /// Sets the counts of captures and detections, and their residuals. `lamps` are those of the
 /// problem.
-void set_detection_residuals(const AssembledProblem& all, const LampMap& lamps, double freedom,
-                             AdjustmentResult& result) {
+void set_lamp_residuals(const AssembledProblem& all, const LampMap& lamps, double freedom,
+                        AdjustmentResult& result) {
   const AdjustmentProblem& problem = all.problem;
   double squares_px = 0;
   std::vector<bool> capture_used(problem.captures.size());
-  const std::vector<double> lengths = compute_residual_norms(problem);
+  const std::vector<double> lengths = list_residual_norms(problem);
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     const auto& sighting = problem.sightings[i];
     const double distance_px = lengths[i] * sighting.sigma_px * problem.noise_scale;
@@ -658,9 +651,9 @@ void set_detection_residuals(const AssembledProblem& all, const LampMap& lamps, 
 }
 
 /// Sets lens, zenith and lever arm.
-void set_adjusted_rotation_center(const AdjustmentProblem& problem, bool has_lever_arm,
-                                  AdjustmentResult& result) {
-  const AdjustmentLayout& at = problem.state_vector_layout();
+void set_rotation_center(const AdjustmentProblem& problem, bool has_lever_arm,
+                         AdjustmentResult& result) {
+  const UnknownIndices& at = problem.layout();
   const Eigen::VectorXd& state = problem.state_vector();
   result.camera.intrinsics = problem.current_intrinsics();
   const Eigen::Vector2d focal_px = result.camera.focal_px();
@@ -673,11 +666,10 @@ void set_adjusted_rotation_center(const AdjustmentProblem& problem, bool has_lev
 
 /// Sets the joint covariance of intrinsics (from the directions of the lens), zenith, lever arm and
 /// lamps, without the pivots. The one for the surveyed map excludes the lamps.
-void set_adjusted_joint_covariance(const AdjustmentProblem& problem,
-                                   const Eigen::MatrixXd& covariance, bool has_lever_arm,
-                                   AdjustmentResult& result) {
-  const AdjustmentLayout& at = problem.state_vector_layout();
-  const Eigen::Index intrinsics = count_intrinsics_with_covariance(result.camera);
+void set_joint_covariance(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
+                          bool has_lever_arm, AdjustmentResult& result) {
+  const UnknownIndices& at = problem.layout();
+  const Eigen::Index intrinsics = count_intrinsics(result.camera);
   const Eigen::Index rows = intrinsics + at.pivots - at.zenith;
   Eigen::MatrixXd from_state = Eigen::MatrixXd::Zero(rows, at.global);
   from_state.block(0, at.lens, intrinsics, at.lens_size) =
@@ -705,7 +697,7 @@ LampMap select_detected_lamps(const AdjustmentInput& input) {
 }
 
 /// Adds a note if a lamp of the map is visible in no capture.
-void add_note_of_undetected_lamps(AdjustmentResult& result) {
+void note_undetected(AdjustmentResult& result) {
   const std::size_t count = result.refined_map.lamps.size() - result.lamps.size();
   if (count == 0) return;
   const auto first = std::ranges::find_if(result.refined_map.lamps, [&](const Lamp& lamp) {
@@ -724,9 +716,9 @@ void add_note_of_undetected_lamps(AdjustmentResult& result) {
 void set_adjusted_map(const AssembledProblem& all, const LampMap& detected_lamps,
                       const Contradictions& contradictions, AdjustmentResult& result) {
   const AdjustmentProblem& problem = all.problem;
-  const AdjustmentLayout& at = problem.state_vector_layout();
+  const UnknownIndices& at = problem.layout();
   const Eigen::VectorXd& state = problem.state_vector();
-  const Eigen::Index first_lamp = count_intrinsics_with_covariance(result.camera) + 4;
+  const Eigen::Index first_lamp = count_intrinsics(result.camera) + 4;
   for (std::size_t i = 0; i < problem.lamps.size(); ++i) {
     const int id = detected_lamps.lamps[i].id;
     Lamp& lamp = *std::ranges::find(result.refined_map.lamps, id, &Lamp::id);
@@ -752,8 +744,8 @@ void set_adjusted_map(const AssembledProblem& all, const LampMap& detected_lamps
     lamp.position_m += correction_m;
     lamp.sd_m = std::sqrt(found.trace() / 3);
   }
-  add_note_of_undetected_lamps(result);
-  if (contradictions.has_contradicting_majority()) {
+  note_undetected(result);
+  if (contradictions.has_majority()) {
     // [ROTATION-3] `half the lamps or more` | `sd_m` too small, or other map frame than of the
     //   known positions | correct it
     result.notes.emplace_back(
@@ -763,7 +755,7 @@ void set_adjusted_map(const AssembledProblem& all, const LampMap& detected_lamps
 
 /// Sets the known positions, and the properties of the map that only the survey determines.
 void set_position_residuals(AssembledProblem& all, AdjustmentResult& result) {
-  compute_reference_position_residuals(all);
+  set_place_residuals(all);
   result.known_positions = all.known_positions;
   std::size_t places_used = 0;
   for (std::size_t i = 0; i < all.known_positions.size(); ++i) {
@@ -785,11 +777,11 @@ void set_position_residuals(AssembledProblem& all, AdjustmentResult& result) {
 /// Tests the correction of the lens against its covariance.
 void set_adjusted_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
                        AdjustmentResult& result) {
-  const AdjustmentLayout& at = problem.state_vector_layout();
+  const UnknownIndices& at = problem.layout();
   const Eigen::VectorXd& state = problem.state_vector();
   const Eigen::VectorXd u = state.segment(at.lens, at.lens_size);
   if (at.lens_size > 0) {
-    const auto determined = eigendecompose_symmetric_matrix(
+    const auto determined = eigendecompose(
         Eigen::MatrixXd(Eigen::MatrixXd::Identity(at.lens_size, at.lens_size) -
                         covariance.block(at.lens, at.lens, at.lens_size, at.lens_size)));
     for (Eigen::Index i = 0; i < at.lens_size; ++i) {
@@ -808,10 +800,10 @@ void set_adjusted_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& 
 
 }  // namespace
 
-MatrixX compute_intrinsics_covariance_from_pixel_sd(const Camera& camera, double sd_px) {
+MatrixX make_intrinsics_covariance(const Camera& camera, double sd_px) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   constexpr int across = 16;
-  Eigen::VectorXd squares = Eigen::VectorXd::Zero(count_intrinsics_with_covariance(camera));
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(count_intrinsics(camera));
   int rays = 0;
   for (int row = 0; row < across; ++row) {
     for (int column = 0; column < across; ++column) {
@@ -819,7 +811,7 @@ MatrixX compute_intrinsics_covariance_from_pixel_sd(const Camera& camera, double
       const auto ray = lens.unproject_pixel(
           {fraction.x() * camera.imager_px[0] - 0.5, fraction.y() * camera.imager_px[1] - 0.5});
       if (!ray) continue;
-      const auto seen = lens.project_point_with_jacobians(ray->direction);
+      const auto seen = lens.project_with_jacobians(ray->direction);
       if (!seen) continue;
       squares += seen->d_pixel_d_parameters.colwise().squaredNorm().transpose() / 2;
       ++rays;
@@ -830,8 +822,7 @@ MatrixX compute_intrinsics_covariance_from_pixel_sd(const Camera& camera, double
   return Eigen::MatrixXd((squares.array() > 0).select(variances, 0).matrix().asDiagonal());
 }
 
-AdjustmentResult run_bundle_adjustment(const AdjustmentInput& all_lamps,
-                                       const AdjustmentLimits& limits) {
+AdjustmentResult adjust_bundle(const AdjustmentInput& all_lamps, const AdjustmentLimits& limits) {
   AdjustmentResult result;
   AdjustmentInput input = all_lamps;
   input.lamps = select_detected_lamps(all_lamps);
@@ -841,7 +832,7 @@ AdjustmentResult run_bundle_adjustment(const AdjustmentInput& all_lamps,
     result.undetermined = kTooFewLampsMessage;
     return result;
   }
-  AssembledProblem all = assemble_adjustment_problem(input);
+  AssembledProblem all = assemble_problem(input);
   const AdjustmentProblem& problem = all.problem;
   result.rejected_captures = all.rejected_captures;
   result.rejected_detections = static_cast<int>(problem.sightings.size());
@@ -858,13 +849,13 @@ AdjustmentResult run_bundle_adjustment(const AdjustmentInput& all_lamps,
     return result;
   }
   const Eigen::MatrixXd& covariance = adjusted->matrix;
-  set_detection_residuals(all, input.lamps, adjusted->degrees_of_freedom, result);
+  set_lamp_residuals(all, input.lamps, adjusted->degrees_of_freedom, result);
   bool has_lever_arm = false;
   result.lamp_height_m = compute_mean_height_m(problem);
   result.undetermined =
       explain_undetermined(problem, covariance, result.lamp_height_m, limits, has_lever_arm);
-  set_adjusted_rotation_center(problem, has_lever_arm, result);
-  set_adjusted_joint_covariance(problem, covariance, has_lever_arm, result);
+  set_rotation_center(problem, has_lever_arm, result);
+  set_joint_covariance(problem, covariance, has_lever_arm, result);
   set_adjusted_map(all, input.lamps, contradictions, result);
   set_position_residuals(all, result);
   set_adjusted_lens(problem, covariance, result);

@@ -81,7 +81,7 @@ struct AdjustmentCapture {
   std::optional<Pose> initial_pose = {};
 };
 
-/// Input of run_bundle_adjustment().
+/// Input of adjust_bundle().
 struct AdjustmentInput {
   std::vector<AdjustmentCapture> captures;
   /// Surveyed lamps with their sd_m. A lamp with sd_m 0 is fixed.
@@ -113,7 +113,7 @@ struct AdjustmentLimits {
   double lever_arm_fraction = 0.005;
 };
 
-/// Result of run_bundle_adjustment().
+/// Result of adjust_bundle().
 struct AdjustmentResult {
   /// Reason why there is no result, and the captures that would determine it, human-readable. Empty
   /// if there is a result.
@@ -213,7 +213,7 @@ struct AdjustmentResult {
 /// none. An error of each intrinsic, taken alone, displaces the pixels of a grid over the image by
 /// `sd_px` (RMS per axis). Errors of different intrinsics are independent.
 /// @pre sd_px is positive
-MatrixX compute_intrinsics_covariance_from_pixel_sd(const Camera& camera, double sd_px);
+MatrixX make_intrinsics_covariance(const Camera& camera, double sd_px);
 
 /// Estimates lens, zenith, lever arm and lamp map from all captures.
 ///
@@ -224,7 +224,6 @@ MatrixX compute_intrinsics_covariance_from_pixel_sd(const Camera& camera, double
 /// its survey contradicts all other data (test of Baarda, chi-squared with 3 degrees of freedom at
 /// 1e-4). Lamps are tested one at a time, the worst first, so that the error of one lamp does not
 /// spread over other lamps. The result is deterministic.
-AdjustmentResult run_bundle_adjustment(const AdjustmentInput& input,
-                                       const AdjustmentLimits& limits = {});
+AdjustmentResult adjust_bundle(const AdjustmentInput& input, const AdjustmentLimits& limits = {});
 
 }  // namespace vlp

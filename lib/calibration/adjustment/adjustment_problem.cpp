@@ -29,8 +29,7 @@ struct CapturePose {
 
 }  // namespace
 
-ZenithRotation rotate_level_point_to_camera(const Eigen::Vector2d& zenith,
-                                            const Eigen::Vector3d& x) {
+ZenithRotation rotate_to_camera(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x) {
   // Transpose of level_rotation_from_zenith(), the smallest rotation of n to +Z.
   const double nz = 1 / std::sqrt(1 + zenith.squaredNorm());
   const Eigen::Vector2d n = zenith * nz;
@@ -53,13 +52,13 @@ LensParametrization::LensParametrization(const Camera& camera,
                                          const std::optional<MatrixX>& covariance)
     : nominal_intrinsics(Eigen::Map<const Eigen::VectorXd>(camera.intrinsics.data(),
                                                            std::ssize(camera.intrinsics))),
-      directions(count_intrinsics_with_covariance(camera), 0) {
+      directions(count_intrinsics(camera), 0) {
   if (!covariance) return;
   // Scales pixels and coefficients by their standard deviations to make them comparable.
   const Eigen::VectorXd sd = covariance->diagonal().cwiseSqrt();
   const Eigen::VectorXd inverse_sd =
       (sd.array() > 0).select(sd.cwiseInverse(), Eigen::VectorXd::Zero(sd.size()));
-  const auto eigen = eigendecompose_symmetric_matrix(
+  const auto eigen = eigendecompose(
       Eigen::MatrixXd(inverse_sd.asDiagonal() * *covariance * inverse_sd.asDiagonal()));
   constexpr double rounding = 1e-12;
   const Eigen::VectorXd& values = eigen.values;
@@ -83,7 +82,7 @@ AdjustmentProblem::AdjustmentProblem(LensModel model, LensParametrization lens,
   state_ = Eigen::VectorXd::Zero(layout_.global);
 }
 
-void AdjustmentProblem::add_capture_with_initial_pose(const Capture& capture, const Pose& start) {
+void AdjustmentProblem::add_capture(const Capture& capture, const Pose& start) {
   Capture added = capture;
   added.local = state_.size();
   captures.push_back(added);
@@ -119,7 +118,7 @@ std::optional<Lens> AdjustmentProblem::current_lens() const {
 
 namespace {
 
-CapturePose compute_capture_pose(const Eigen::VectorXd& state, const AdjustmentLayout& layout,
+CapturePose compute_capture_pose(const Eigen::VectorXd& state, const UnknownIndices& layout,
                                  const AdjustmentProblem::Capture& capture) {
   const Eigen::Index motion = capture.local + capture.num_pose_unknowns();
   const double yaw_rad = state[motion - 1];
@@ -145,8 +144,8 @@ double arm_factor(const AdjustmentProblem::PositionObservation& place,
 
 }  // namespace
 
-std::optional<AdjustmentResidual> AdjustmentProblem::linearize_lamp_observation(
-    const Sighting& sighting, const Lens& lens) const {
+std::optional<AdjustmentResidual> AdjustmentProblem::linearize_sighting(const Sighting& sighting,
+                                                                        const Lens& lens) const {
   const Capture& capture = captures[sighting.capture];
   const CapturePose camera = compute_capture_pose(state_, layout_, capture);
   const Eigen::Index lamp = layout_.lamp_state_index(sighting.lamp);
@@ -159,9 +158,9 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize_lamp_observation(
   rotated = (readout_from_middle * rotated).eval();
   Eigen::Vector3d level = rotated;
   if (capture.pivot) level.head<2>() -= state_.segment<2>(layout_.lever_arm);
-  const ZenithRotation turn = rotate_level_point_to_camera(state_.segment<2>(layout_.zenith),
-                                                           capture.base_from_level * level);
-  const auto seen = lens.project_point_with_jacobians(turn.x_in_camera);
+  const ZenithRotation turn =
+      rotate_to_camera(state_.segment<2>(layout_.zenith), capture.base_from_level * level);
+  const auto seen = lens.project_with_jacobians(turn.x_in_camera);
   if (!seen) return std::nullopt;
   const Eigen::Matrix2d weight = sighting.whitening / noise_scale;
   const Matrix23 by_camera = -weight * seen->d_pixel_d_point;
@@ -194,8 +193,7 @@ std::optional<AdjustmentResidual> AdjustmentProblem::linearize_lamp_observation(
   return at;
 }
 
-Eigen::Vector3d AdjustmentProblem::predict_camera_or_axis_position(
-    const PositionObservation& place) const {
+Eigen::Vector3d AdjustmentProblem::predict_position(const PositionObservation& place) const {
   const Capture& capture = captures[place.capture];
   const CapturePose camera = compute_capture_pose(state_, layout_, capture);
   Eigen::Vector3d arm_m = Eigen::Vector3d::Zero();
@@ -204,12 +202,11 @@ Eigen::Vector3d AdjustmentProblem::predict_camera_or_axis_position(
          arm_factor(place, capture) * (camera.level_from_world.transpose() * arm_m);
 }
 
-AdjustmentResidual AdjustmentProblem::linearize_known_position(
-    const PositionObservation& place) const {
+AdjustmentResidual AdjustmentProblem::linearize_place(const PositionObservation& place) const {
   const Capture& capture = captures[place.capture];
   const CapturePose camera = compute_capture_pose(state_, layout_, capture);
   const double factor = arm_factor(place, capture);
-  const Eigen::Vector3d position_m = predict_camera_or_axis_position(place);
+  const Eigen::Vector3d position_m = predict_position(place);
   const Eigen::Vector3d arm_m = position_m - camera.position_m;
   Eigen::MatrixXd by_local = Eigen::MatrixXd::Zero(3, capture.size());
   if (!capture.pivot) by_local.leftCols<3>().setIdentity();
@@ -228,7 +225,7 @@ AdjustmentResidual AdjustmentProblem::linearize_known_position(
   return at;
 }
 
-AdjustmentResidual AdjustmentProblem::linearize_motion_prior(const Capture& capture) const {
+AdjustmentResidual AdjustmentProblem::linearize_motion(const Capture& capture) const {
   const Eigen::Index size = capture.num_motion_unknowns();
   AdjustmentResidual at{state_.segment(capture.local + capture.num_pose_unknowns(), size),
                         {{capture.local, Eigen::MatrixXd::Zero(size, capture.size())}}};
@@ -247,7 +244,7 @@ AdjustmentResidual AdjustmentProblem::linearize_motion_prior(const Capture& capt
   return at;
 }
 
-AdjustmentResidual AdjustmentProblem::linearize_gauge_constraint() const {
+AdjustmentResidual AdjustmentProblem::linearize_gauge() const {
   AdjustmentResidual at{Eigen::VectorXd::Zero(gauge.cols()), {}};
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     const Eigen::MatrixXd by_lamp =
@@ -265,7 +262,7 @@ bool AdjustmentProblem::is_block_exact(Eigen::Index first) const {
          lamps[static_cast<std::size_t>(first - layout_.lamps) / 3].is_exact();
 }
 
-AdjustmentResidual AdjustmentProblem::linearize_lamp_prior(std::size_t lamp) const {
+AdjustmentResidual AdjustmentProblem::linearize_prior(std::size_t lamp) const {
   const auto& [surveyed_m, sd_m, is_height_only] = lamps[lamp];
   const Eigen::Index at = layout_.lamp_state_index(lamp), size = is_height_only ? 1 : 3;
   // Far below the resolution of detections, and far above rounding.
@@ -275,7 +272,7 @@ AdjustmentResidual AdjustmentProblem::linearize_lamp_prior(std::size_t lamp) con
           {{at, weight * Eigen::Matrix3d::Identity().bottomRows(size)}}};
 }
 
-std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_least_squares_terms(
+std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_terms(
     const std::optional<Lens>& lens) const {
   std::vector<Term> terms;
   std::vector<bool> capture_used(captures.size());
@@ -283,7 +280,7 @@ std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_least_squares_terms
     if (!sighting.used) continue;
     capture_used[sighting.capture] = true;
     terms.push_back({[this, &sighting, &lens] {
-                       return lens ? linearize_lamp_observation(sighting, *lens) : std::nullopt;
+                       return lens ? linearize_sighting(sighting, *lens) : std::nullopt;
                      },
                      true, true, sighting.capture});
   }
@@ -296,17 +293,17 @@ std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_least_squares_terms
   }
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     if (lamps[i].is_exact() || std::isinf(lamps[i].sd_m)) continue;
-    terms.push_back({[this, i] { return linearize_lamp_prior(i); }, true});
+    terms.push_back({[this, i] { return linearize_prior(i); }, true});
   }
-  if (gauge.cols() > 0) terms.push_back({[this] { return linearize_gauge_constraint(); }});
+  if (gauge.cols() > 0) terms.push_back({[this] { return linearize_gauge(); }});
   for (const PositionObservation& place : position_observations) {
     if (!is_known_position_used[place.known_position] || !capture_used[place.capture]) continue;
     terms.push_back(
-        {[this, &place] { return linearize_known_position(place); }, true, false, place.capture});
+        {[this, &place] { return linearize_place(place); }, true, false, place.capture});
   }
   for (std::size_t k = 0; k < captures.size(); ++k) {
     if (captures[k].num_motion_unknowns() == 0 || !capture_used[k]) continue;
-    terms.push_back({[this, k] { return linearize_motion_prior(captures[k]); }, false, false, k});
+    terms.push_back({[this, k] { return linearize_motion(captures[k]); }, false, false, k});
   }
   return terms;
 }
@@ -364,7 +361,7 @@ bool AdjustmentProblem::solve_adjustment(bool robust) {
   problem_options.evaluation_callback = &lenses;
   ceres::Problem ceres(problem_options);
   auto order = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (const Term& term : make_least_squares_terms(lenses.lens)) {
+  for (const Term& term : make_terms(lenses.lens)) {
     const auto start = term.linearize();
     if (!start) return false;
     std::vector<double*> blocks;
@@ -390,7 +387,7 @@ bool AdjustmentProblem::solve_adjustment(bool robust) {
   return solve_with_ceres(options, ceres) && state_.allFinite();
 }
 
-Eigen::MatrixXd AdjustmentProblem::make_weak_prior_information_matrix() const {
+Eigen::MatrixXd AdjustmentProblem::make_weak_prior() const {
   constexpr double guess_rad = 1, guess_m = 10;
   Eigen::VectorXd information = Eigen::VectorXd::Zero(layout_.global);
   information.segment<2>(layout_.zenith).setConstant(1 / (guess_rad * guess_rad));
@@ -431,8 +428,7 @@ struct CaptureRows {
   }
 
   /// Computes the marginalization, and subtracts it from the information of the global unknowns.
-  void marginalize_local_unknowns(const AdjustmentProblem::Capture& capture,
-                                  Eigen::MatrixXd& information) {
+  void marginalize(const AdjustmentProblem::Capture& capture, Eigen::MatrixXd& information) {
     columns.assign(unknowns.begin(), unknowns.end());
     by_global = Eigen::MatrixXd::Zero(rows, std::ssize(columns));
     by_local = Eigen::MatrixXd::Zero(rows, capture.size());
@@ -451,7 +447,7 @@ struct CaptureRows {
     Eigen::MatrixXd local = by_local.transpose() * by_local;
     local.diagonal().head(capture.num_pose_unknowns()).array() += guess_information;
     local_covariance =
-        solve_symmetric_system(local, Eigen::MatrixXd::Identity(capture.size(), capture.size()));
+        solve_symmetric(local, Eigen::MatrixXd::Identity(capture.size(), capture.size()));
     const Eigen::MatrixXd cross = by_local.transpose() * by_global;
     local_from_global = local_covariance * cross;
     information(columns, columns) +=
@@ -462,7 +458,7 @@ struct CaptureRows {
   ///   tr(B N^-1 B' + (A - B N^-1 M) C (A - B N^-1 M)')
   /// with their derivatives B with respect to the local and A with respect to the global unknowns.
   /// C is the covariance of the global unknowns.
-  double compute_predicted_variance(const Eigen::MatrixXd& global_covariance) const {
+  double predict_variance(const Eigen::MatrixXd& global_covariance) const {
     const auto of_local = by_local.topRows(detection_rows);
     const Eigen::MatrixXd of_global =
         by_global.topRows(detection_rows) - of_local * local_from_global;
@@ -473,11 +469,11 @@ struct CaptureRows {
 
 }  // namespace
 
-AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_unknowns_covariance() const {
-  Eigen::MatrixXd information = make_weak_prior_information_matrix();
+AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_covariance() const {
+  Eigen::MatrixXd information = make_weak_prior();
   std::vector<CaptureRows> rows(captures.size());
   const auto lens = this->current_lens();
-  for (const Term& term : make_least_squares_terms(lens)) {
+  for (const Term& term : make_terms(lens)) {
     auto at = term.linearize();
     if (!at) continue;
     std::erase_if(at->blocks, [&](const auto& part) { return is_block_exact(part.first); });
@@ -491,12 +487,11 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_unknowns_c
       }
     }
   }
-  for (std::size_t k = 0; k < captures.size(); ++k)
-    rows[k].marginalize_local_unknowns(captures[k], information);
+  for (std::size_t k = 0; k < captures.size(); ++k) rows[k].marginalize(captures[k], information);
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   Eigen::MatrixXd covariance =
-      solve_symmetric_system(scale.asDiagonal() * information * scale.asDiagonal(),
-                             Eigen::MatrixXd::Identity(layout_.global, layout_.global));
+      solve_symmetric(scale.asDiagonal() * information * scale.asDiagonal(),
+                      Eigen::MatrixXd::Identity(layout_.global, layout_.global));
   covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
   covariance = 0.5 * (covariance + covariance.transpose()).eval();
   if (is_zenith_exact) covariance.diagonal().segment<2>(layout_.zenith).setZero();
@@ -506,8 +501,7 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_global_unknowns_c
   }
   double freedom = 0;
   for (const CaptureRows& capture : rows) {
-    freedom += static_cast<double>(capture.detection_rows) -
-               capture.compute_predicted_variance(covariance);
+    freedom += static_cast<double>(capture.detection_rows) - capture.predict_variance(covariance);
   }
   return {covariance, freedom};
 }

@@ -13,13 +13,13 @@
 #include "positioning/positioner.h"
 #include "rig/calibration.h"
 
-/// Least-squares problem of run_bundle_adjustment(): unknowns in one vector, residuals with
+/// Least-squares problem of adjust_bundle(): unknowns in one vector, residuals with
 /// derivatives, solution by Ceres, covariance.
 namespace vlp {
 
 /// Index of the first unknown of each kind in the state vector. Global unknowns come first, in the
 /// order of the members; those of each capture follow. A kind without unknowns has size 0.
-struct AdjustmentLayout {
+struct UnknownIndices {
   /// Index and number of the unknowns of the lens, in units of its standard deviations
   /// (LensParametrization).
   Eigen::Index lens = 0, lens_size = 0;
@@ -42,7 +42,7 @@ struct AdjustmentLayout {
 };
 
 /// Whitened parametrization of the lens: intrinsics = start + directions u, where u has unit
-/// covariance. Comprises the intrinsics that have errors (count_intrinsics_with_covariance()).
+/// covariance. Comprises the intrinsics that have errors (count_intrinsics()).
 /// Omits directions in which the covariance is numeric noise.
 struct LensParametrization {
   Eigen::VectorXd nominal_intrinsics;
@@ -123,9 +123,9 @@ class AdjustmentProblem {
                     std::size_t pivots);
 
   /// Adds a capture and its local unknowns, with the initial pose `start`.
-  void add_capture_with_initial_pose(const Capture& capture, const Pose& start);
+  void add_capture(const Capture& capture, const Pose& start);
 
-  const AdjustmentLayout& state_vector_layout() const { return layout_; }
+  const UnknownIndices& layout() const { return layout_; }
   Eigen::VectorXd& state_vector() { return state_; }
   const Eigen::VectorXd& state_vector() const { return state_; }
 
@@ -151,17 +151,17 @@ class AdjustmentProblem {
 
   /// Linearizes an observation at the current state, measured minus predicted. Returns std::nullopt
   /// if the lens cannot project the point.
-  std::optional<AdjustmentResidual> linearize_lamp_observation(const Sighting& sighting,
-                                                               const Lens& lens) const;
+  std::optional<AdjustmentResidual> linearize_sighting(const Sighting& sighting,
+                                                       const Lens& lens) const;
 
   /// Returns the position of the camera (or of the axis) in the capture, from the current state.
-  Eigen::Vector3d predict_camera_or_axis_position(const PositionObservation& place) const;
+  Eigen::Vector3d predict_position(const PositionObservation& place) const;
 
   /// Returns the lens of the current state; std::nullopt if its intrinsics are invalid.
   std::optional<Lens> current_lens() const;
   std::vector<double> current_intrinsics() const;
 
-  /// Result of compute_global_unknowns_covariance().
+  /// Result of compute_covariance().
   struct GlobalCovariance {
     /// Covariance of the global unknowns, zero for exact ones. Unknowns without any residual have
     /// the standard deviation of a guess: 1 rad, 10 m.
@@ -172,7 +172,7 @@ class AdjustmentProblem {
   };
   /// Computes the covariance of the global unknowns at the current state, after marginalization of
   /// the local ones.
-  GlobalCovariance compute_global_unknowns_covariance() const;
+  GlobalCovariance compute_covariance() const;
 
   const LensParametrization& lens_parametrization() const { return lens_parametrization_; }
 
@@ -188,23 +188,23 @@ class AdjustmentProblem {
   };
   /// Returns all terms, those of the detections first. They refer to this object and to `lens`, the
   /// lens of the current state.
-  std::vector<Term> make_least_squares_terms(const std::optional<Lens>& lens) const;
-  AdjustmentResidual linearize_known_position(const PositionObservation& place) const;
-  AdjustmentResidual linearize_motion_prior(const Capture& capture) const;
-  AdjustmentResidual linearize_lamp_prior(std::size_t lamp) const;
-  AdjustmentResidual linearize_gauge_constraint() const;
+  std::vector<Term> make_terms(const std::optional<Lens>& lens) const;
+  AdjustmentResidual linearize_place(const PositionObservation& place) const;
+  AdjustmentResidual linearize_motion(const Capture& capture) const;
+  AdjustmentResidual linearize_prior(std::size_t lamp) const;
+  AdjustmentResidual linearize_gauge() const;
   /// Returns true if the block of the state is exact: the zenith, or the position of a lamp.
   bool is_block_exact(Eigen::Index first) const;
   /// Returns the information of the global unknowns without a prior, for a guess.
-  Eigen::MatrixXd make_weak_prior_information_matrix() const;
+  Eigen::MatrixXd make_weak_prior() const;
 
   LensModel model_;
   LensParametrization lens_parametrization_;
-  AdjustmentLayout layout_;
+  UnknownIndices layout_;
   Eigen::VectorXd state_;
 };
 
-/// Result of rotate_level_point_to_camera(): point in the camera frame, its derivative with respect
+/// Result of rotate_to_camera(): point in the camera frame, its derivative with respect
 /// to the zenith's normalized point, and the rotation.
 struct ZenithRotation {
   Eigen::Vector3d x_in_camera;
@@ -213,7 +213,6 @@ struct ZenithRotation {
 };
 /// Rotates a point of the level frame into the camera by camera_from_level of a zenith, given as a
 /// normalized point.
-ZenithRotation rotate_level_point_to_camera(const Eigen::Vector2d& zenith,
-                                            const Eigen::Vector3d& x_in_level);
+ZenithRotation rotate_to_camera(const Eigen::Vector2d& zenith, const Eigen::Vector3d& x_in_level);
 
 }  // namespace vlp

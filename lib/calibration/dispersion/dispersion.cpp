@@ -13,11 +13,10 @@ namespace vlp {
 namespace {
 
 /// Sets the fixes and circles before and after the correction.
-void set_fixes_before_and_after(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
-                                const std::vector<bool>& used, DispersionCircle kind) {
-  const OptionalFixes before = reference_fixes.compute_capture_fixes_with_dispersion_offset({0, 0}),
-                      after = reference_fixes.compute_capture_fixes_with_dispersion_offset(
-                          fit.dispersion.offset_px);
+void set_before_and_after(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
+                          const std::vector<bool>& used, DispersionCircle kind) {
+  const OptionalFixes before = reference_fixes.locate_with_offset({0, 0}),
+                      after = reference_fixes.locate_with_offset(fit.dispersion.offset_px);
   std::vector<Eigen::Vector2d> before_m, after_m;
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (!before[i] || !after[i]) continue;
@@ -26,8 +25,8 @@ void set_fixes_before_and_after(DispersionFit& fit, const ReferencePointFixes& r
     before_m.push_back(before[i]->error_m);
     after_m.push_back(after[i]->error_m);
   }
-  fit.before = fit_circle_to_dispersed_fixes(before_m, kind);
-  fit.after = fit_circle_to_dispersed_fixes(after_m, kind);
+  fit.before = fit_dispersion_circle(before_m, kind);
+  fit.after = fit_dispersion_circle(after_m, kind);
   fit.dispersion.radius_m = fit.before.radius;
   fit.dispersion.center_m = fit.before.center;
   fit.dispersion.captures = static_cast<int>(before_m.size());
@@ -43,28 +42,28 @@ bool all_have_sigma(std::span<const ReferencePointCapture> captures) {
 void fit_chen_guan_offset(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
                           const Eigen::Vector2d& focal_px, DispersionCircle kind) {
   const ChenGuanOffset found =
-      estimate_dispersion_offset_by_chen_guan(reference_fixes, focal_px, kind, fit.noise_is_stated);
+      estimate_chen_guan_offset(reference_fixes, focal_px, kind, fit.noise_is_stated);
   fit.status = found.status;
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
   fit.covariance = found.covariance;
   fit.lamp_derivatives = found.lamp_derivatives;
-  set_fixes_before_and_after(fit, reference_fixes, found.used, kind);
+  set_before_and_after(fit, reference_fixes, found.used, kind);
 }
 
 void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
                        DispersionCircle kind) {
-  const auto separation = separate_camera_and_world_offsets(reference_fixes);
+  const auto separation = separate_offsets(reference_fixes);
   if (!separation) {
     fit.status = DispersionStatus::diverged;
     return;
   }
-  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_with_dispersion_offset({0, 0});
+  const OptionalFixes fixes = reference_fixes.locate_with_offset({0, 0});
   if (compute_mean_fix(fixes, separation->used).count < 3) {
     fit.status = DispersionStatus::too_few_captures;
     return;
   }
-  if (is_yaw_variation_due_to_one_fix(fixes, separation->used)) {
+  if (is_yaw_range_from_one_fix(fixes, separation->used)) {
     fit.status = DispersionStatus::single_yaw;
     return;
   }
@@ -72,7 +71,7 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
     fit.status = DispersionStatus::too_few_captures;
     return;
   }
-  const double factor = compute_small_sample_variance_factor(
+  const double factor = compute_variance_factor(
       separation->variance_factor, separation->degrees_of_freedom, fit.noise_is_stated);
   fit.dispersion.offset_px = separation->offset_px;
   Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>();
@@ -81,24 +80,22 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
   fit.lamp_derivatives = separation->lamp_derivatives;
   fit.lamp_derivatives.jacobian_wrt_positions.conservativeResize(2, Eigen::NoChange);
   const Eigen::MatrixXd world_changes_m =
-      separation->lamp_derivatives.scale_jacobian_by_lamp_sds().bottomRows<2>();
+      separation->lamp_derivatives.scale_by_lamp_sds().bottomRows<2>();
   fit.world_offset_m = separation->world_m;
   fit.world_covariance = factor * separation->covariance.bottomRightCorner<2, 2>() +
                          world_changes_m * world_changes_m.transpose();
-  set_fixes_before_and_after(fit, reference_fixes, separation->used, kind);
+  set_before_and_after(fit, reference_fixes, separation->used, kind);
 }
 
 }  // namespace
 
-JointCovariance add_offset_to_covariance(JointCovariance joint, const DispersionFit& fit,
-                                         const MatrixX& jacobian_wrt_steps,
-                                         const Eigen::Vector2d& focal_px) {
+JointCovariance append_offset(JointCovariance joint, const DispersionFit& fit,
+                              const MatrixX& jacobian_wrt_steps, const Eigen::Vector2d& focal_px) {
   const auto& [lamps, by_positions] = fit.lamp_derivatives;
   for (const Lamp& lamp : lamps) {
     if (joint.find_lamp_row(lamp.id, lamp.position_m)) continue;
     joint.lamps.push_back({lamp.id, lamp.position_m});
-    append_parameters(joint, list_lamp_parameter_names(lamp.id),
-                      MatrixX::Zero(3, joint.matrix.rows()),
+    append_parameters(joint, list_lamp_parameters(lamp.id), MatrixX::Zero(3, joint.matrix.rows()),
                       *lamp.sd_m * *lamp.sd_m * MatrixX::Identity(3, 3));
   }
   const Eigen::Matrix2d per_px = focal_px.cwiseInverse().asDiagonal();
@@ -113,25 +110,25 @@ JointCovariance add_offset_to_covariance(JointCovariance joint, const Dispersion
   return joint;
 }
 
-DispersionFit estimate_dispersion_offset(std::span<const ReferencePointCapture> captures,
-                                         const LampMap& map, const Calibration& calibration,
-                                         DispersionMethod method, DispersionCircle circle) {
+DispersionFit estimate_dispersion(std::span<const ReferencePointCapture> captures,
+                                  const LampMap& map, const Calibration& calibration,
+                                  DispersionMethod method, DispersionCircle circle) {
   const ReferencePointFixes reference_fixes(captures, map, calibration);
-  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_with_dispersion_offset({0, 0});
+  const OptionalFixes fixes = reference_fixes.locate_with_offset({0, 0});
   const auto count =
       std::count_if(fixes.begin(), fixes.end(), [](const auto& fix) { return fix.has_value(); });
   DispersionFit fit;
   fit.captures_without_fix = static_cast<int>(std::ssize(fixes) - count);
-  fit.no_fix_status = reference_fixes.first_failed_fix_status();
+  fit.no_fix_status = reference_fixes.first_failure();
   fit.noise_is_stated = all_have_sigma(captures);
   if (count == 0) return fit;
   const bool paper = method == DispersionMethod::chen_guan;
   const std::vector<bool> all(fixes.size(), true);
-  if (are_all_fixes_far_from_reference_point(fixes)) {
+  if (are_all_fixes_far(fixes)) {
     fit.status = DispersionStatus::all_far_from_reference;
   } else if (count < (paper ? 2 : 3)) {
     fit.status = DispersionStatus::too_few_captures;
-  } else if (!paper && compute_mean_fix(fixes, all).are_capture_yaws_similar()) {
+  } else if (!paper && compute_mean_fix(fixes, all).are_yaws_similar()) {
     fit.status = DispersionStatus::single_yaw;
   } else {
     fit.status = DispersionStatus::ok;
@@ -144,7 +141,7 @@ DispersionFit estimate_dispersion_offset(std::span<const ReferencePointCapture> 
   return fit;
 }
 
-std::string_view describe_dispersion_status(DispersionStatus status) {
+std::string_view describe_status(DispersionStatus status) {
   switch (status) {
     case DispersionStatus::ok:
       return "ok";

@@ -25,7 +25,7 @@ struct ReferencePointCapture {
   std::optional<Inclination> inclination = {};
 };
 
-/// Method of estimate_dispersion_offset().
+/// Method of estimate_dispersion().
 enum class DispersionMethod {
   /// Separates errors that rotate with the camera from errors that are fixed in the world. Requires
   /// captures at various yaws.
@@ -51,7 +51,7 @@ enum class DispersionStatus {
 };
 
 /// Describes the status and the remedy, human-readable.
-std::string_view describe_dispersion_status(DispersionStatus status);
+std::string_view describe_status(DispersionStatus status);
 
 /// Derivatives of a vector of quantities with respect to the positions of lamps. Unit: that of the
 /// quantity, per m. `lamps` are the detected ones with an sd_m in the map.
@@ -62,10 +62,10 @@ struct LampDerivatives {
 
   /// Returns the changes of the quantities for errors of one standard deviation, one column per
   /// lamp coordinate.
-  Eigen::MatrixXd scale_jacobian_by_lamp_sds() const;
+  Eigen::MatrixXd scale_by_lamp_sds() const;
 };
 
-/// Result of estimate_dispersion_offset(). Members after `noise_is_stated` are valid only if
+/// Result of estimate_dispersion(). Members after `noise_is_stated` are valid only if
 /// the status is `ok`.
 struct DispersionFit {
   DispersionStatus status = DispersionStatus::no_fix;
@@ -79,7 +79,7 @@ struct DispersionFit {
   /// Offset; the circle is that of `before`.
   Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0};
   /// Covariance of offset_px in px^2 with exact lens, zenith, lever arm and map, from the scatter
-  /// of the fixes and their noise (compute_small_sample_variance_factor()); derivatives of
+  /// of the fixes and their noise (compute_variance_factor()); derivatives of
   /// offset_px with respect to the lamps. Absent for the enclosing circle.
   std::optional<Matrix2> covariance = {};
   LampDerivatives lamp_derivatives = {};
@@ -112,9 +112,8 @@ struct DispersionFit {
 /// @param jacobian_wrt_steps  derivative of offset_px / f with respect to the parameters before the
 /// lamps
 /// @pre the fit has a covariance
-JointCovariance add_offset_to_covariance(JointCovariance joint, const DispersionFit& fit,
-                                         const MatrixX& jacobian_wrt_steps,
-                                         const Eigen::Vector2d& focal_px);
+JointCovariance append_offset(JointCovariance joint, const DispersionFit& fit,
+                              const MatrixX& jacobian_wrt_steps, const Eigen::Vector2d& focal_px);
 
 /// Estimates the dispersion: an offset in the undistorted image that makes fixes err with the yaw
 /// of the camera (lib/THEORY.md, "Dispersion circle").
@@ -125,7 +124,7 @@ JointCovariance add_offset_to_covariance(JointCovariance joint, const Dispersion
 ///
 /// Method `chen_guan` assumes m = 0. The center D of the circle gives offset_px = -f e^{-jg} D / H.
 /// The offset is corrected until the circle of the recomputed fixes is centered at the reference
-/// point (estimate_dispersion_offset_by_chen_guan()). These are eq. 10 to 13, with the scale f / H
+/// point (estimate_chen_guan_offset()). These are eq. 10 to 13, with the scale f / H
 /// and the rotation by the yaw, which the paper omits.
 ///
 /// Method `camera` estimates offset_px = f delta and m. The fixes are recomputed with the offset as
@@ -136,9 +135,9 @@ JointCovariance add_offset_to_covariance(JointCovariance joint, const Dispersion
 /// existing dispersion of `calibration` is ignored.
 ///
 /// Source: Chen and Guan, section 3.2.
-DispersionFit estimate_dispersion_offset(std::span<const ReferencePointCapture> captures,
-                                         const LampMap& map, const Calibration& calibration,
-                                         DispersionMethod method,
-                                         DispersionCircle circle = DispersionCircle::mean);
+DispersionFit estimate_dispersion(std::span<const ReferencePointCapture> captures,
+                                  const LampMap& map, const Calibration& calibration,
+                                  DispersionMethod method,
+                                  DispersionCircle circle = DispersionCircle::mean);
 
 }  // namespace vlp

@@ -28,16 +28,16 @@ struct Equation {
   Eigen::Matrix2d whitening;
 };
 
-std::vector<Equation> linearize_fix_equations(const ReferencePointFixes& fixes,
-                                              const OffsetSeparation& at) {
+std::vector<Equation> linearize_fixes(const ReferencePointFixes& fixes,
+                                      const OffsetSeparation& at) {
   constexpr double step_px =
       0.25;  // fixes are smooth over this step, which is far above their rounding
   const Eigen::Vector2d along_u(step_px, 0), along_v(0, step_px);
-  const Fixes here = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px);
-  const Fixes right = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px + along_u),
-              left = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px - along_u);
-  const Fixes down = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px + along_v),
-              up = fixes.compute_capture_fixes_with_dispersion_offset(at.offset_px - along_v);
+  const Fixes here = fixes.locate_with_offset(at.offset_px);
+  const Fixes right = fixes.locate_with_offset(at.offset_px + along_u),
+              left = fixes.locate_with_offset(at.offset_px - along_u);
+  const Fixes down = fixes.locate_with_offset(at.offset_px + along_v),
+              up = fixes.locate_with_offset(at.offset_px - along_v);
   std::vector<Equation> equations;
   equations.reserve(here.size());
   for (std::size_t i = 0; i < here.size(); ++i) {
@@ -53,7 +53,7 @@ std::vector<Equation> linearize_fix_equations(const ReferencePointFixes& fixes,
   return equations;
 }
 
-std::vector<double> compute_squared_residuals(const std::vector<Equation>& equations) {
+std::vector<double> square_residuals(const std::vector<Equation>& equations) {
   std::vector<double> squares;
   squares.reserve(equations.size());
   for (const Equation& equation : equations) squares.push_back(equation.residual.squaredNorm());
@@ -62,9 +62,9 @@ std::vector<double> compute_squared_residuals(const std::vector<Equation>& equat
 
 /// Applies one step of weighted least squares to `at` and returns it. Returns std::nullopt if the
 /// equations do not determine it.
-std::optional<Eigen::Vector4d> apply_least_squares_step(const std::vector<Equation>& equations,
-                                                        const std::vector<double>& weights,
-                                                        OffsetSeparation& at) {
+std::optional<Eigen::Vector4d> apply_step(const std::vector<Equation>& equations,
+                                          const std::vector<double>& weights,
+                                          OffsetSeparation& at) {
   Eigen::Matrix4d information = Eigen::Matrix4d::Zero();
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();
   double chi_squared = 0;
@@ -94,7 +94,7 @@ double count_degrees_of_freedom(const std::vector<double>& squares) {
 
 /// Estimates the variance per axis. Returns a value above zero, so that it can be a divisor.
 double estimate_variance(const std::vector<double>& squares) {
-  return std::max(estimate_robust_variance_2d(squares, count_degrees_of_freedom(squares)),
+  return std::max(estimate_variance_2d(squares, count_degrees_of_freedom(squares)),
                   kFixRoundingVariance);
 }
 
@@ -104,14 +104,14 @@ bool solve_approximately(const ReferencePointFixes& fixes, OffsetSeparation& at)
   constexpr int iterations = 6;
   constexpr double width_squared = 2.385 * 2.385;  // 95 % efficiency for normal noise
   for (int iteration = 0; iteration < iterations; ++iteration) {
-    const auto equations = linearize_fix_equations(fixes, at);
+    const auto equations = linearize_fixes(fixes, at);
     if (equations.empty()) return false;
-    std::vector<double> weights = compute_squared_residuals(equations);
+    std::vector<double> weights = square_residuals(equations);
     const double variance = iteration == 0 ? 0 : estimate_variance(weights);
     for (double& one : weights) {
       one = iteration == 0 ? 1 : 1 / (1 + one / (width_squared * variance));
     }
-    if (!apply_least_squares_step(equations, weights, at)) return false;
+    if (!apply_step(equations, weights, at)) return false;
   }
   return true;
 }
@@ -121,11 +121,11 @@ bool solve_approximately(const ReferencePointFixes& fixes, OffsetSeparation& at)
 std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, OffsetSeparation& at) {
   constexpr int max_iterations = 30;
   constexpr double tolerance_px = 1e-7, tolerance_m = 1e-10;
-  auto equations = linearize_fix_equations(fixes, at);
+  auto equations = linearize_fixes(fixes, at);
   if (equations.empty()) return std::nullopt;
-  const auto squares = compute_squared_residuals(equations);
+  const auto squares = square_residuals(equations);
   const double limit =
-      compute_squared_outlier_bound_2d(kFixOutlierSigmas, count_degrees_of_freedom(squares)) *
+      compute_outlier_bound_2d(kFixOutlierSigmas, count_degrees_of_freedom(squares)) *
       estimate_variance(squares);
   std::vector<bool> used(at.used.size());
   for (std::size_t i = 0; i < squares.size(); ++i) {
@@ -137,11 +137,11 @@ std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, Off
     std::vector<double> weights;
     weights.reserve(equations.size());
     for (const Equation& equation : equations) weights.push_back(at.used[equation.capture] ? 1 : 0);
-    const auto step = apply_least_squares_step(equations, weights, at);
+    const auto step = apply_step(equations, weights, at);
     if (!step) return std::nullopt;
     if (step->head<2>().norm() < tolerance_px && step->tail<2>().norm() < tolerance_m)
       return changed;
-    equations = linearize_fix_equations(fixes, at);
+    equations = linearize_fixes(fixes, at);
   }
   return std::nullopt;
 }
@@ -149,11 +149,11 @@ std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, Off
 /// Propagates errors of the map. The solution changes by -(J'WJ)^-1 J'W d, where d are the changes
 /// of the fixes.
 LampDerivatives propagate_map_errors(const ReferencePointFixes& fixes, const OffsetSeparation& at) {
-  LampDerivatives derivatives = fixes.compute_fix_jacobian_wrt_lamps(at.offset_px);
+  LampDerivatives derivatives = fixes.differentiate_by_lamps(at.offset_px);
   if (derivatives.lamps.empty()) return derivatives;
   const Eigen::MatrixXd& d_fixes = derivatives.jacobian_wrt_positions;
   Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(4, d_fixes.cols());
-  for (const Equation& equation : linearize_fix_equations(fixes, at)) {
+  for (const Equation& equation : linearize_fixes(fixes, at)) {
     if (!at.used[equation.capture]) continue;
     const auto row = 2 * static_cast<Eigen::Index>(equation.capture);
     gradient += equation.jacobian.transpose() * equation.whitening * d_fixes.middleRows<2>(row);
@@ -164,10 +164,9 @@ LampDerivatives propagate_map_errors(const ReferencePointFixes& fixes, const Off
 
 }  // namespace
 
-std::optional<OffsetSeparation> separate_camera_and_world_offsets(
-    const ReferencePointFixes& fixes) {
+std::optional<OffsetSeparation> separate_offsets(const ReferencePointFixes& fixes) {
   OffsetSeparation result;
-  result.used.resize(fixes.compute_capture_fixes_with_dispersion_offset(result.offset_px).size());
+  result.used.resize(fixes.locate_with_offset(result.offset_px).size());
   if (!solve_approximately(fixes, result)) return std::nullopt;
   constexpr int max_iterations = 10;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
@@ -184,8 +183,7 @@ namespace {
 std::vector<Eigen::Vector2d> compute_errors(const ReferencePointFixes& reference_fixes,
                                             const Eigen::Vector2d& offset_px,
                                             const std::vector<bool>& used) {
-  const OptionalFixes fixes =
-      reference_fixes.compute_capture_fixes_with_dispersion_offset(offset_px);
+  const OptionalFixes fixes = reference_fixes.locate_with_offset(offset_px);
   std::vector<Eigen::Vector2d> errors_m;
   for (std::size_t i = 0; i < fixes.size(); ++i) {
     if (fixes[i] && used[i]) errors_m.push_back(fixes[i]->error_m);
@@ -201,9 +199,9 @@ Eigen::Vector2d compute_mean_point(const std::vector<Eigen::Vector2d>& points) {
 
 /// Differentiates the mean fix with respect to the offset, numerically. The result is not finite if
 /// there is no fix.
-Eigen::Matrix2d differentiate_mean_fix_by_offset(const ReferencePointFixes& reference_fixes,
-                                                 const Eigen::Vector2d& at_px,
-                                                 const std::vector<bool>& used) {
+Eigen::Matrix2d differentiate_mean_fix(const ReferencePointFixes& reference_fixes,
+                                       const Eigen::Vector2d& at_px,
+                                       const std::vector<bool>& used) {
   constexpr double step_px =
       0.25;  // fixes are smooth over this step, which is far above their rounding
   Eigen::Matrix2d derivative;
@@ -238,10 +236,10 @@ Eigen::Matrix2d compute_mean_noise(const OptionalFixes& fixes, const std::vector
 ///
 /// Few errors do not determine a covariance: two errors give one of rank 1. The sample covariance
 /// therefore has weight n - 1 and its isotropic mean has isotropic_weight.
-/// compute_small_sample_variance_factor() scales the variance along each axis of the result, in
+/// compute_variance_factor() scales the variance along each axis of the result, in
 /// coordinates in which the noise is the unit matrix.
-Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& errors,
-                                            const Eigen::Matrix2d& noise) {
+Eigen::Matrix2d estimate_covariance(const std::vector<Eigen::Vector2d>& errors,
+                                    const Eigen::Matrix2d& noise) {
   constexpr double isotropic_weight = 2;  // as three errors
   const Eigen::Vector2d mean = compute_mean_point(errors);
   Eigen::Matrix2d squares = Eigen::Matrix2d::Zero();
@@ -254,22 +252,21 @@ Eigen::Matrix2d estimate_covariance_of_mean(const std::vector<Eigen::Vector2d>& 
       (n - 1 + isotropic_weight);
   const Eigen::LLT<Eigen::Matrix2d> root(noise);
   if (root.info() != Eigen::Success)
-    return compute_small_sample_variance_factor(1, freedom, false) * scatter / n;
+    return compute_variance_factor(1, freedom, false) * scatter / n;
   const Eigen::Matrix2d l = root.matrixL(), l_inverse = l.inverse();
   auto [values, axes] =
-      eigendecompose_symmetric_matrix(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
+      eigendecompose(Eigen::Matrix2d(l_inverse * scatter * l_inverse.transpose()));
   const double ratio = (l_inverse * squares * l_inverse.transpose()).trace() / freedom;
-  for (double& value : values)
-    value = compute_small_sample_variance_factor(value, freedom, true, ratio);
+  for (double& value : values) value = compute_variance_factor(value, freedom, true, ratio);
   return l * axes * values.asDiagonal() * axes.transpose() * l.transpose() / n;
 }
 
 /// Computes the derivatives of the offset with respect to the positions of the lamps. The offset
 /// compensates the mean change of the fixes.
-LampDerivatives compute_offset_derivatives(const ReferencePointFixes& reference_fixes,
-                                           const ChenGuanOffset& found,
-                                           const Eigen::Matrix2d& image_from_floor) {
-  LampDerivatives derivatives = reference_fixes.compute_fix_jacobian_wrt_lamps(found.offset_px);
+LampDerivatives differentiate_offset(const ReferencePointFixes& reference_fixes,
+                                     const ChenGuanOffset& found,
+                                     const Eigen::Matrix2d& image_from_floor) {
+  LampDerivatives derivatives = reference_fixes.differentiate_by_lamps(found.offset_px);
   Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, derivatives.jacobian_wrt_positions.cols());
   double count = 0;
   for (std::size_t i = 0; i < found.used.size(); ++i) {
@@ -283,9 +280,8 @@ LampDerivatives compute_offset_derivatives(const ReferencePointFixes& reference_
 
 }  // namespace
 
-Circle fit_circle_to_dispersed_fixes(const std::vector<Eigen::Vector2d>& points,
-                                     DispersionCircle kind) {
-  if (kind == DispersionCircle::enclosing) return compute_enclosing_circle(points);
+Circle fit_dispersion_circle(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind) {
+  if (kind == DispersionCircle::enclosing) return enclose_in_circle(points);
   Circle circle{compute_mean_point(points), 0};
   for (const auto& point : points) {
     circle.radius = std::max(circle.radius, (point - circle.center).norm());
@@ -293,14 +289,13 @@ Circle fit_circle_to_dispersed_fixes(const std::vector<Eigen::Vector2d>& points,
   return circle;
 }
 
-ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes& reference_fixes,
-                                                       const Eigen::Vector2d& focal_px,
-                                                       DispersionCircle kind,
-                                                       bool noise_is_stated) {
-  const OptionalFixes fixes = reference_fixes.compute_capture_fixes_with_dispersion_offset({0, 0});
-  const std::vector<bool> used = flag_fixes_near_median(fixes);
+ChenGuanOffset estimate_chen_guan_offset(const ReferencePointFixes& reference_fixes,
+                                         const Eigen::Vector2d& focal_px, DispersionCircle kind,
+                                         bool noise_is_stated) {
+  const OptionalFixes fixes = reference_fixes.locate_with_offset({0, 0});
+  const std::vector<bool> used = flag_inlier_fixes(fixes);
   const MeanFix mean_fix = compute_mean_fix(fixes, used);
-  if (!mean_fix.are_capture_yaws_similar()) return {.status = DispersionStatus::several_yaws};
+  if (!mean_fix.are_yaws_similar()) return {.status = DispersionStatus::several_yaws};
   Eigen::Matrix2d image_from_floor =
       focal_px.asDiagonal() *
       Eigen::Matrix2d(complex_product_matrix(mean_fix.heading.normalized()).transpose() /
@@ -311,10 +306,9 @@ ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const auto errors_m = compute_errors(reference_fixes, offset_px, used);
     if (errors_m.size() < 2) break;
-    const Eigen::Vector2d center_m = fit_circle_to_dispersed_fixes(errors_m, kind).center;
+    const Eigen::Vector2d center_m = fit_dispersion_circle(errors_m, kind).center;
     if (iteration > 0) {
-      image_from_floor =
-          differentiate_mean_fix_by_offset(reference_fixes, offset_px, used).inverse();
+      image_from_floor = differentiate_mean_fix(reference_fixes, offset_px, used).inverse();
       if (!image_from_floor.allFinite()) break;
     }
     if (center_m.norm() > tolerance_m) {
@@ -323,14 +317,13 @@ ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes
     }
     ChenGuanOffset found{.status = DispersionStatus::ok, .offset_px = offset_px, .used = used};
     if (kind == DispersionCircle::mean) {
-      const Eigen::Matrix2d noise_m2 = compute_mean_noise(
-          reference_fixes.compute_capture_fixes_with_dispersion_offset(offset_px), used,
-          noise_is_stated);
-      const Eigen::Matrix2d mean_covariance_m2 = estimate_covariance_of_mean(errors_m, noise_m2);
+      const Eigen::Matrix2d noise_m2 =
+          compute_mean_noise(reference_fixes.locate_with_offset(offset_px), used, noise_is_stated);
+      const Eigen::Matrix2d mean_covariance_m2 = estimate_covariance(errors_m, noise_m2);
       Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);
       found.covariance = covariance;
-      found.lamp_derivatives = compute_offset_derivatives(reference_fixes, found, image_from_floor);
+      found.lamp_derivatives = differentiate_offset(reference_fixes, found, image_from_floor);
     }
     return found;
   }

@@ -11,7 +11,7 @@
 
 namespace vlp {
 
-/// Errors of camera and world from estimate_dispersion_offset(), method `camera`.
+/// Errors of camera and world from estimate_dispersion(), method `camera`.
 struct OffsetSeparation {
   /// Offset (u, v) of the dispersion in the undistorted image, px. It rotates with the camera,
   /// unlike `world_m`.
@@ -38,10 +38,10 @@ struct OffsetSeparation {
 ///
 /// Returns std::nullopt if the captures do not determine the unknowns, or if the iterations do not
 /// converge.
-std::optional<OffsetSeparation> separate_camera_and_world_offsets(const ReferencePointFixes& fixes);
+std::optional<OffsetSeparation> separate_offsets(const ReferencePointFixes& fixes);
 
 /// Number of standard deviations beyond which a fix is an outlier, for a known variance
-/// (compute_squared_outlier_bound_2d()).
+/// (compute_outlier_bound_2d()).
 inline constexpr double kFixOutlierSigmas = 5;
 /// Smallest variance of residuals, in m^2 or relative to their covariance. Smaller ones are numeric
 /// noise.
@@ -49,10 +49,9 @@ inline constexpr double kFixRoundingVariance = 1e-24;
 
 /// Returns the dispersion circle of the points.
 /// @pre there is at least one point
-Circle fit_circle_to_dispersed_fixes(const std::vector<Eigen::Vector2d>& points,
-                                     DispersionCircle kind);
+Circle fit_dispersion_circle(const std::vector<Eigen::Vector2d>& points, DispersionCircle kind);
 
-/// Result of estimate_dispersion_offset_by_chen_guan(). Members other than `status` are valid only
+/// Result of estimate_chen_guan_offset(). Members other than `status` are valid only
 /// if it is `ok`.
 struct ChenGuanOffset {
   /// Status `ok`, `several_yaws` or `diverged`.
@@ -79,8 +78,8 @@ struct ChenGuanOffset {
 /// is applied as a shift and all lamps have one height. After a rotation center of model `tilt` the
 /// offset is applied as a rotation, which moves fixes by more. The offset is therefore corrected by
 /// the remaining D until it vanishes.
-ChenGuanOffset estimate_dispersion_offset_by_chen_guan(const ReferencePointFixes& reference_fixes,
-                                                       const Eigen::Vector2d& focal_px,
-                                                       DispersionCircle kind, bool noise_is_stated);
+ChenGuanOffset estimate_chen_guan_offset(const ReferencePointFixes& reference_fixes,
+                                         const Eigen::Vector2d& focal_px, DispersionCircle kind,
+                                         bool noise_is_stated);
 
 }  // namespace vlp

@@ -22,7 +22,7 @@ namespace vlp {
 namespace {
 
 /// Returns the mean height of the detected lamps, in the world.
-double compute_lamp_height_above_camera(const ReferencePointCapture& capture, const LampMap& map) {
+double compute_lamp_height(const ReferencePointCapture& capture, const LampMap& map) {
   double sum_m = 0;
   int count = 0;
   for (const Detection& detection : capture.detections) {
@@ -48,7 +48,7 @@ Fix locate_camera_of_capture(const Positioner& positioner, const ReferencePointC
 
 }  // namespace
 
-Eigen::MatrixXd LampDerivatives::scale_jacobian_by_lamp_sds() const {
+Eigen::MatrixXd LampDerivatives::scale_by_lamp_sds() const {
   Eigen::MatrixXd moves = jacobian_wrt_positions;
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     moves.middleCols<3>(3 * static_cast<Eigen::Index>(i)) *= *lamps[i].sd_m;
@@ -60,7 +60,7 @@ ReferencePointFixes::ReferencePointFixes(std::span<const ReferencePointCapture> 
                                          const LampMap& map, const Calibration& calibration)
     : captures_(captures.begin(), captures.end()),
       map_(map),
-      calibration_(remove_dispersion_from_calibration(calibration)) {
+      calibration_(remove_dispersion(calibration)) {
   const Positioner positioner(map_, calibration_);
   for (ReferencePointCapture& capture : captures_) {
     const Fix fix = locate_camera_of_capture(positioner, capture);
@@ -73,15 +73,13 @@ ReferencePointFixes::ReferencePointFixes(std::span<const ReferencePointCapture> 
   }
 }
 
-std::vector<std::optional<ReferencePointFixes::Estimate>>
-ReferencePointFixes::compute_capture_fixes_with_dispersion_offset(
+std::vector<std::optional<ReferencePointFixes::Estimate>> ReferencePointFixes::locate_with_offset(
     const Eigen::Vector2d& offset_px) const {
-  return compute_capture_fixes_with_dispersion_offset(offset_px, map_);
+  return locate_with_offset(offset_px, map_);
 }
 
-std::vector<std::optional<ReferencePointFixes::Estimate>>
-ReferencePointFixes::compute_capture_fixes_with_dispersion_offset(const Eigen::Vector2d& offset_px,
-                                                                  const LampMap& map) const {
+std::vector<std::optional<ReferencePointFixes::Estimate>> ReferencePointFixes::locate_with_offset(
+    const Eigen::Vector2d& offset_px, const LampMap& map) const {
   Calibration calibration = calibration_;
   calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1};
   PositionerOptions options;
@@ -95,14 +93,14 @@ ReferencePointFixes::compute_capture_fixes_with_dispersion_offset(const Eigen::V
     fixes[i] = Estimate{pose.position_m.head<2>() - captures_[i].reference_point_m,
                         fix.noise_covariance.topLeftCorner<2, 2>(),
                         pose.yaw_rad,
-                        compute_lamp_height_above_camera(captures_[i], map) - pose.position_m.z(),
+                        compute_lamp_height(captures_[i], map) - pose.position_m.z(),
                         fix.residual_px * fix.residual_px * fix.lamps,
                         2 * fix.lamps - 4};
   }
   return fixes;
 }
 
-LampDerivatives ReferencePointFixes::compute_fix_jacobian_wrt_lamps(
+LampDerivatives ReferencePointFixes::differentiate_by_lamps(
     const Eigen::Vector2d& offset_px) const {
   std::set<int> detected;
   for (const ReferencePointCapture& capture : captures_) {
@@ -120,7 +118,7 @@ LampDerivatives ReferencePointFixes::compute_fix_jacobian_wrt_lamps(
   jacobian_wrt_positions =
       Eigen::MatrixXd::Zero(2 * std::ssize(captures_), 3 * std::ssize(uncertain));
   if (uncertain.empty()) return derivatives;
-  const auto here = compute_capture_fixes_with_dispersion_offset(offset_px);
+  const auto here = locate_with_offset(offset_px);
   LampMap moved = map_;
   for (Eigen::Index column = 0; column < jacobian_wrt_positions.cols(); ++column) {
     const std::size_t lamp = uncertain[static_cast<std::size_t>(column / 3)];
@@ -128,7 +126,7 @@ LampDerivatives ReferencePointFixes::compute_fix_jacobian_wrt_lamps(
     constexpr double max_step_m = 1e-4;
     const double step_m = std::min(*map_.lamps[lamp].sd_m, max_step_m);
     coordinate_m += step_m;
-    const auto there = compute_capture_fixes_with_dispersion_offset(offset_px, moved);
+    const auto there = locate_with_offset(offset_px, moved);
     coordinate_m = map_.lamps[lamp].position_m[column % 3];
     for (std::size_t i = 0; i < here.size(); ++i) {
       if (!here[i] || !there[i]) continue;
@@ -145,7 +143,7 @@ constexpr double kMaxErrorFraction = 0.2;  // of the lamps' height
 
 /// Computes the weight of residuals that contradict given noise: 0 up to the ratio that 20 % of
 /// all residuals exceed, 1 from that of 5 %, linear in between.
-double compute_noise_contradiction_weight(double ratio, double degrees_of_freedom) {
+double weight_contradiction(double ratio, double degrees_of_freedom) {
   constexpr double sigmas_of_20_percent = 0.8416, sigmas_of_5_percent = 1.6449;
   const double first =
       compute_chi_squared_bound(sigmas_of_20_percent, degrees_of_freedom) / degrees_of_freedom;
@@ -156,13 +154,13 @@ double compute_noise_contradiction_weight(double ratio, double degrees_of_freedo
 
 }  // namespace
 
-double MeanFix::compute_capture_yaw_variation() const {
+double MeanFix::compute_yaw_variation() const {
   return std::sqrt(std::max(0.0, 1 - heading.squaredNorm()));
 }
 
-bool MeanFix::are_capture_yaws_similar() const {
+bool MeanFix::are_yaws_similar() const {
   constexpr double one_yaw_rad = rad_from_deg(10);
-  return compute_capture_yaw_variation() < std::sin(one_yaw_rad);
+  return compute_yaw_variation() < std::sin(one_yaw_rad);
 }
 
 MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& used) {
@@ -178,25 +176,24 @@ MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& us
   return mean_fix;
 }
 
-bool is_yaw_variation_due_to_one_fix(const OptionalFixes& fixes, std::vector<bool> used) {
+bool is_yaw_range_from_one_fix(const OptionalFixes& fixes, std::vector<bool> used) {
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!fixes[i] || !used[i]) continue;
     used[i] = false;
-    if (compute_mean_fix(fixes, used).are_capture_yaws_similar()) return true;
+    if (compute_mean_fix(fixes, used).are_yaws_similar()) return true;
     used[i] = true;
   }
   return false;
 }
 
-bool are_all_fixes_far_from_reference_point(const OptionalFixes& fixes) {
+bool are_all_fixes_far(const OptionalFixes& fixes) {
   return std::all_of(fixes.begin(), fixes.end(), [](const auto& fix) {
     return !fix || fix->error_m.norm() > kMaxErrorFraction * fix->height_m;
   });
 }
 
-double compute_small_sample_variance_factor(double ratio, double degrees_of_freedom,
-                                            bool noise_is_stated,
-                                            std::optional<double> pooled_ratio) {
+double compute_variance_factor(double ratio, double degrees_of_freedom, bool noise_is_stated,
+                               std::optional<double> pooled_ratio) {
   assert(degrees_of_freedom > 0);
   const double from_residuals = ratio * compute_student_factor(degrees_of_freedom);
   if (!noise_is_stated) return from_residuals;
@@ -204,12 +201,11 @@ double compute_small_sample_variance_factor(double ratio, double degrees_of_free
   const double combined = (kGivenNoiseDegreesOfFreedom + degrees_of_freedom * ratio) /
                           total_freedom * compute_student_factor(total_freedom);
   const double factor = std::max(1.0, combined);
-  const double weight =
-      compute_noise_contradiction_weight(pooled_ratio.value_or(ratio), degrees_of_freedom);
+  const double weight = weight_contradiction(pooled_ratio.value_or(ratio), degrees_of_freedom);
   return factor * std::pow(std::max(1.0, from_residuals / factor), weight);
 }
 
-std::vector<bool> flag_fixes_near_median(const OptionalFixes& fixes) {
+std::vector<bool> flag_inlier_fixes(const OptionalFixes& fixes) {
   std::vector<double> x, y, squares;
   for (const auto& fix : fixes) {
     if (!fix) continue;
@@ -221,9 +217,8 @@ std::vector<bool> flag_fixes_near_median(const OptionalFixes& fixes) {
     if (fix) squares.push_back((fix->error_m - middle_m).squaredNorm());
   }
   const double freedom = 2 * static_cast<double>(squares.size()) - 2;
-  const double variance =
-      std::max(estimate_robust_variance_2d(squares, freedom), kFixRoundingVariance);
-  const double limit = compute_squared_outlier_bound_2d(kFixOutlierSigmas, freedom) * variance;
+  const double variance = std::max(estimate_variance_2d(squares, freedom), kFixRoundingVariance);
+  const double limit = compute_outlier_bound_2d(kFixOutlierSigmas, freedom) * variance;
   std::vector<bool> near;
   near.reserve(fixes.size());
   for (const auto& fix : fixes) {

@@ -37,18 +37,17 @@ class ReferencePointFixes {
                       const Calibration& calibration);
 
   /// Returns the fix of each capture; std::nullopt for captures without a fix.
-  std::vector<std::optional<Estimate>> compute_capture_fixes_with_dispersion_offset(
-      const Eigen::Vector2d& offset_px) const;
+  std::vector<std::optional<Estimate>> locate_with_offset(const Eigen::Vector2d& offset_px) const;
   /// Computes the derivatives of the fixes, in m, with respect to the positions of the lamps that
   /// are detected and have an sd_m above zero. Differentiates numerically, one coordinate at a
   /// time. The result has two rows for each capture, which are zero without a fix.
-  LampDerivatives compute_fix_jacobian_wrt_lamps(const Eigen::Vector2d& offset_px) const;
+  LampDerivatives differentiate_by_lamps(const Eigen::Vector2d& offset_px) const;
   /// Returns the status of the first capture without a fix; `ok` if there is none.
-  FixStatus first_failed_fix_status() const { return first_failure_; }
+  FixStatus first_failure() const { return first_failure_; }
 
  private:
-  std::vector<std::optional<Estimate>> compute_capture_fixes_with_dispersion_offset(
-      const Eigen::Vector2d& offset_px, const LampMap& map) const;
+  std::vector<std::optional<Estimate>> locate_with_offset(const Eigen::Vector2d& offset_px,
+                                                          const LampMap& map) const;
 
   std::vector<ReferencePointCapture> captures_;
   const LampMap& map_;
@@ -69,9 +68,9 @@ struct MeanFix {
   int count = 0;
 
   /// Returns the approximate RMS sine of the yaws relative to their mean.
-  double compute_capture_yaw_variation() const;
+  double compute_yaw_variation() const;
   /// Returns true if the yaws vary by less than about 10 degrees.
-  bool are_capture_yaws_similar() const;
+  bool are_yaws_similar() const;
 };
 
 /// Computes the means over the fixes that are used.
@@ -79,11 +78,11 @@ MeanFix compute_mean_fix(const OptionalFixes& fixes, const std::vector<bool>& us
 
 /// Returns true if the removal of a single fix leaves one yaw. One fix alone is not sufficient to
 /// separate errors of camera and world.
-bool is_yaw_variation_due_to_one_fix(const OptionalFixes& fixes, std::vector<bool> used);
+bool is_yaw_range_from_one_fix(const OptionalFixes& fixes, std::vector<bool> used);
 
 /// Returns true if every fix is farther from the reference point than a camera tilted by 11 degrees
 /// would be.
-bool are_all_fixes_far_from_reference_point(const OptionalFixes& fixes);
+bool are_all_fixes_far(const OptionalFixes& fixes);
 
 /// Degrees of freedom assigned to given noise: its standard deviation is accurate to 29 %, 1 /
 /// sqrt(12).
@@ -94,20 +93,19 @@ inline constexpr double kGivenNoiseDegreesOfFreedom = 6;
 ///
 /// The residuals have the variance s^2 = `ratio` times the nominal one, with nu degrees of freedom;
 /// q(m) = (t_m / 1.96)^2 with a bound t_m of Student's t at 97.5 %
-/// (compute_squared_student_t_bound). If the noise is not stated the factor is ratio q(nu). Given
+/// (compute_squared_t_bound). If the noise is not stated the factor is ratio q(nu). Given
 /// noise counts as an estimate with n = kGivenNoiseDegreesOfFreedom:
 ///   f = max(1, (n + nu ratio) / (n + nu) q(n + nu)),
 /// and if the residuals contradict it, f (ratio q(nu) / f)^w where that is larger: w rises from 0
 /// to 1 with chi-squared between its bounds of 20 % and 5 %, so that the factor is continuous.
 /// @param pooled_ratio  ratio of all axes, which determines w; `ratio` without it
 /// @pre degrees_of_freedom > 0
-double compute_small_sample_variance_factor(double ratio, double degrees_of_freedom,
-                                            bool noise_is_stated,
-                                            std::optional<double> pooled_ratio = {});
+double compute_variance_factor(double ratio, double degrees_of_freedom, bool noise_is_stated,
+                               std::optional<double> pooled_ratio = {});
 
 /// Returns true for each fix within five standard deviations of the median fix, for fixes at one
 /// yaw.
 /// @pre there is at least one fix
-std::vector<bool> flag_fixes_near_median(const OptionalFixes& fixes);
+std::vector<bool> flag_inlier_fixes(const OptionalFixes& fixes);
 
 }  // namespace vlp

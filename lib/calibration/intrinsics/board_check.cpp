@@ -51,8 +51,8 @@ double compute_mean_edge_px(const TagDetection& tag) {
 
 /// Returns the steps from every tag to its four nearest neighbors, including tags that the board
 /// does not have. `shift_px`: inward displacement of the tag edges.
-std::vector<Step> collect_tag_center_steps(std::span<const BoardView> views,
-                                           const std::optional<Lens>& lens, double shift_px) {
+std::vector<Step> collect_steps(std::span<const BoardView> views, const std::optional<Lens>& lens,
+                                double shift_px) {
   constexpr std::size_t nearest = 4;
   std::vector<Step> steps;
   for (const BoardView& view : views) {
@@ -201,7 +201,7 @@ int estimate_id_increment(int axis, const std::vector<Step>& steps) {
 
 /// Returns the layout that explains the steps; std::nullopt if none does. Ids that increase by one
 /// along rows increase by the number of columns from row to row, and vice versa.
-std::optional<Board> find_matching_layout(Board board, const std::vector<Step>& steps) {
+std::optional<Board> find_layout(Board board, const std::vector<Step>& steps) {
   constexpr double min_fraction = 0.8;
   constexpr int max_tags = 1000;
   const int right = estimate_id_increment(0, steps), down = estimate_id_increment(1, steps);
@@ -254,7 +254,7 @@ std::string describe_layout_problem(const Board& board, const std::vector<Step>&
   std::copy_if(steps.begin(), steps.end(), std::back_inserter(known),
                [&](const Step& step) { return has(step.from) && has(step.to); });
   const bool fits = known.empty() || fit_board_layout(board, known).fraction() >= min_fraction;
-  const auto found = find_matching_layout(board, steps);
+  const auto found = find_layout(board, steps);
   if (fits && !known.empty()) {
     // Unknown tags may belong to another board next to this one, unless they continue its layout.
     std::vector<Step> across;
@@ -299,7 +299,7 @@ bool is_pitch_consistent(const LayoutFit& fit, double expected, double tolerance
          sigmas * fit.line->pitch_sd / expected <= tolerance;
 }
 
-std::string describe_charuco_board(const Board& board) {
+std::string describe_charuco(const Board& board) {
   return "the images show cols " + std::to_string(board.cols) + ", rows " +
          std::to_string(board.rows) + ", top_left " + (board.top_left_white ? "white" : "black");
 }
@@ -317,7 +317,7 @@ std::string describe_charuco_problem(const Board& board, const std::vector<Step>
     opposite.top_left_white = !board.top_left_white;
     const bool is_stated_better =
         fit_board_layout(opposite, steps).num_agreeing <= stated.num_agreeing;
-    return is_stated_better ? "" : describe_charuco_board(opposite);
+    return is_stated_better ? "" : describe_charuco(opposite);
   }
   int largest = 0;
   for (const Step& step : steps) largest = std::max({largest, step.from, step.to});
@@ -347,7 +347,7 @@ std::string describe_charuco_problem(const Board& board, const std::vector<Step>
            std::to_string(board.cols) + " x " + std::to_string(board.rows) + " squares from id " +
            std::to_string(board.first_id) + "; is it another board?";
   }
-  return describe_charuco_board(*best);
+  return describe_charuco(*best);
 }
 
 BoardCheck check_charuco_layout(const Board& board, const std::vector<Step>& steps) {
@@ -357,10 +357,9 @@ BoardCheck check_charuco_layout(const Board& board, const std::vector<Step>& ste
   constexpr double tolerance = 0.15, hundreds = 100;
   const double stated = board.square_size_m / board.tag_size_m;
   if (std::abs(*check.pitch / stated - 1) <= tolerance) return check;
-  check.problem = "a square is " +
-                  format_shortest_exact_number(std::round(hundreds * stated) / hundreds) +
+  check.problem = "a square is " + format_exact_number(std::round(hundreds * stated) / hundreds) +
                   " markers wide by board.yaml, but " +
-                  format_shortest_exact_number(std::round(hundreds * *check.pitch) / hundreds) +
+                  format_exact_number(std::round(hundreds * *check.pitch) / hundreds) +
                   " in the images";
   return check;
 }
@@ -370,11 +369,10 @@ BoardCheck check_charuco_layout(const Board& board, const std::vector<Step>& ste
 BoardCheck check_board_layout(const Board& board, std::span<const BoardView> views,
                               const std::optional<Lens>& lens, double shift_px) {
   // A larger displacement is caused by another spacing, not by a tone curve.
-  const auto steps =
-      collect_tag_center_steps(views, lens, std::clamp(shift_px, -kMaxShift_px, kMaxShift_px));
+  const auto steps = collect_steps(views, lens, std::clamp(shift_px, -kMaxShift_px, kMaxShift_px));
   constexpr std::size_t min_steps = 10;
   if (steps.size() < min_steps) return {};
-  if (board.has_chessboard_squares()) return check_charuco_layout(board, steps);
+  if (board.has_squares()) return check_charuco_layout(board, steps);
   BoardCheck check{describe_layout_problem(board, steps), {}};
   const LayoutFit fit = fit_board_layout(board, steps);
   check.pitch = fit.pitch;
@@ -385,8 +383,8 @@ BoardCheck check_board_layout(const Board& board, std::span<const BoardView> vie
     const double seen = std::round((*fit.pitch - 1) * hundreds) / hundreds;
     // [LENS-4] `images show gaps` | wrong `tag_spacing`; strong tone curve or overexposure; out of
     //   focus | measure it; expose less; focus
-    check.problem = "tag_spacing is " + format_shortest_exact_number(board.tag_spacing) +
-                    ", but the images show gaps of " + format_shortest_exact_number(seen) + " tags";
+    check.problem = "tag_spacing is " + format_exact_number(board.tag_spacing) +
+                    ", but the images show gaps of " + format_exact_number(seen) + " tags";
   }
   return check;
 }

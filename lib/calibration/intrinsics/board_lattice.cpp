@@ -20,7 +20,7 @@ Eigen::Vector3d rotate_into_camera(const BoardPose& pose, const Eigen::Vector2d&
 }
 
 /// Returns the displacement of corner k if the two edges that meet there move inwards by 1 px.
-Eigen::Vector2d compute_inward_displacement(const TagDetection& tag, std::size_t k) {
+Eigen::Vector2d compute_inward_shift(const TagDetection& tag, std::size_t k) {
   const auto& corners = tag.corners_px;
   const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
   Eigen::Matrix2d normals;
@@ -38,7 +38,7 @@ Eigen::Vector2d compute_inward_displacement(const TagDetection& tag, std::size_t
 }  // namespace
 
 BoardLattice::BoardLattice(const Board& board)
-    : has_squares_(board.has_chessboard_squares()), is_touching_(board.corner_squares) {
+    : has_squares_(board.has_squares()), is_touching_(board.corner_squares) {
   constexpr double numeric_tolerance = 1e-9;
   field_m_ = compute_tag_field_size_m(board);
   if (has_squares_) {
@@ -69,14 +69,13 @@ BoardLattice::BoardLattice(const Board& board)
   board_warp_ratio_ = (field_m_.array() / part_m).square();
 }
 
-std::vector<BoardLattice::Corner> BoardLattice::list_corners_with_board_positions(
-    const BoardDetection& seen) const {
+std::vector<BoardLattice::Corner> BoardLattice::list_corners(const BoardDetection& seen) const {
   constexpr int right[] = {0, 1, 1, 0}, down[] = {1, 1, 0, 0};  // bottom left, bottom right, ...
   std::vector<Corner> all;
   if (has_squares_ || !seen.points.empty()) {
     all.reserve(seen.points.size());
     for (const auto& [index, pixel, sd_px, weight] : seen.points) {
-      const std::size_t part = index / num_points_per_part(), point = index % num_points_per_part();
+      const std::size_t part = index / points_per_part(), point = index % points_per_part();
       const auto cols = static_cast<std::size_t>(cols_);
       const std::size_t row = point / cols;
       const Eigen::Vector2d node(static_cast<double>(point % cols), static_cast<double>(row));
@@ -96,7 +95,7 @@ std::vector<BoardLattice::Corner> BoardLattice::list_corners_with_board_position
                      tag.corners_px[k],
                      parts_ == 1 ? 0 : k,
                      static_cast<std::size_t>(row * cols_ + col),
-                     is_touching_ ? Eigen::Vector2d::Zero() : compute_inward_displacement(tag, k),
+                     is_touching_ ? Eigen::Vector2d::Zero() : compute_inward_shift(tag, k),
                      1,
                      tag.curvatures[k],
                      tag.corner_sds_px[k]});
@@ -105,7 +104,7 @@ std::vector<BoardLattice::Corner> BoardLattice::list_corners_with_board_position
   return all;
 }
 
-std::vector<BoardLattice::Corner> BoardLattice::apply_warp_to_board_corners(
+std::vector<BoardLattice::Corner> BoardLattice::apply_warp(
     std::vector<Corner> corners, const Eigen::Vector2d& warp_of_part_m) const {
   const Eigen::Vector2d warp_m = warp_of_part_m.cwiseProduct(board_warp_ratio_);
   for (Corner& corner : corners) {
@@ -116,34 +115,34 @@ std::vector<BoardLattice::Corner> BoardLattice::apply_warp_to_board_corners(
   return corners;
 }
 
-BoardPose BoardLattice::compute_board_part_pose(const BoardPose& camera_from_board,
-                                                std::size_t part) const {
+BoardPose BoardLattice::compute_part_pose(const BoardPose& camera_from_board,
+                                          std::size_t part) const {
   return {camera_from_board.rotation, camera_from_board.translation_m +
                                           rotate_into_camera(camera_from_board, origins_m_[part])};
 }
 
-bool BoardLattice::are_points_sufficient_for_pose(const std::vector<PointDetection>& seen) const {
+bool BoardLattice::can_determine_pose(const std::vector<PointDetection>& seen) const {
   constexpr std::size_t min_count = 12, min_count_per_part = 6;  // of a part, where there are four
   std::vector<std::map<std::size_t, int>> in_row(parts_);
   std::vector<std::size_t> count(parts_);
   for (const PointDetection& point : seen) {
-    const std::size_t part = point.index / num_points_per_part();
+    const std::size_t part = point.index / points_per_part();
     ++count[part];
-    ++in_row[part][point.index % num_points_per_part() / static_cast<std::size_t>(cols_)];
+    ++in_row[part][point.index % points_per_part() / static_cast<std::size_t>(cols_)];
   }
   for (std::size_t part = 0; part < parts_; ++part) {
     const auto rows = std::count_if(in_row[part].begin(), in_row[part].end(),
                                     [](const auto& row) { return row.second > 1; });
     if (rows < 2) return false;
     // A small board may have no more.
-    if (count[part] < std::min(num_points_per_part(), parts_ == 1 ? min_count : min_count_per_part))
+    if (count[part] < std::min(points_per_part(), parts_ == 1 ? min_count : min_count_per_part))
       return false;
   }
   return true;
 }
 
-bool BoardLattice::are_corners_sufficient_for_pose(const BoardDetection& seen) const {
-  if (has_squares_ || !seen.points.empty()) return are_points_sufficient_for_pose(seen.points);
+bool BoardLattice::can_determine_pose(const BoardDetection& seen) const {
+  if (has_squares_ || !seen.points.empty()) return can_determine_pose(seen.points);
   constexpr std::size_t min_count = 3, min_count_per_part = 6;
   std::set<int> cols, rows;
   for (const TagDetection& tag : seen.tags) {

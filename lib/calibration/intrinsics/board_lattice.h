@@ -30,7 +30,7 @@ class BoardLattice {
   int lattice_rows() const { return rows_; }
   /// Distance between adjacent points of a part, m.
   double point_spacing_m() const { return spacing_m_; }
-  std::size_t num_points_per_part() const {
+  std::size_t points_per_part() const {
     return static_cast<std::size_t>(cols_) * static_cast<std::size_t>(rows_);
   }
   /// Ratio of the warp of the whole board to that of a part, along x and y; a part is smaller.
@@ -54,33 +54,33 @@ class BoardLattice {
   };
   /// Returns all corners of a detection on a flat board, in the order of `seen`: its points, or
   /// four corners of each tag.
-  std::vector<Corner> list_corners_with_board_positions(const BoardDetection& seen) const;
+  std::vector<Corner> list_corners(const BoardDetection& seen) const;
   /// Returns the PointDetection::index of a point: part by part, row by row.
-  std::size_t point_index_on_board(std::size_t part, std::size_t point) const {
-    return part * num_points_per_part() + point;
+  std::size_t board_point_index(std::size_t part, std::size_t point) const {
+    return part * points_per_part() + point;
   }
   /// Returns the index of the tag of a point. The corners of a tag share its edges and therefore
   /// have correlated errors. On a board of squares each point is a group of its own.
-  std::size_t find_tag_index_of_point(std::size_t point) const {
+  std::size_t get_tag_of_point(std::size_t point) const {
     if (has_squares_ || parts_ > 1) return point;
     const auto cols = static_cast<std::size_t>(cols_);
     return point / cols / 2 * (cols / 2) + point % cols / 2;
   }
   /// Returns the corners of a board whose parts have the warp `warp_of_part_m`, along x and y.
-  std::vector<Corner> apply_warp_to_board_corners(std::vector<Corner> corners,
-                                                  const Eigen::Vector2d& warp_of_part_m) const;
+  std::vector<Corner> apply_warp(std::vector<Corner> corners,
+                                 const Eigen::Vector2d& warp_of_part_m) const;
 
   /// Computes the pose of a part from that of the board.
-  BoardPose compute_board_part_pose(const BoardPose& camera_from_board, std::size_t part) const;
+  BoardPose compute_part_pose(const BoardPose& camera_from_board, std::size_t part) const;
   /// Returns true if the corners determine the pose of every part:
   /// - points: at least 12 of a board in one part, 6 in each of four parts, or all points of a
   ///   smaller board; at least two points in each of two rows
   /// - tags: at least 3 of a board in one part; at least 6 of a board in four parts, in at least
   ///   two columns and two rows
-  bool are_corners_sufficient_for_pose(const BoardDetection& seen) const;
+  bool can_determine_pose(const BoardDetection& seen) const;
 
  private:
-  bool are_points_sufficient_for_pose(const std::vector<PointDetection>& seen) const;
+  bool can_determine_pose(const std::vector<PointDetection>& seen) const;
   struct TagPosition {
     int col, row;
     std::array<Eigen::Vector2d, 4> corners_m;

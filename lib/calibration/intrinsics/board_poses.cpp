@@ -25,15 +25,15 @@ struct RigidPose {
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation_m;
 
-  Eigen::Vector3d transform_to_camera(const Eigen::Vector3d& in_board_m) const {
+  Eigen::Vector3d to_camera(const Eigen::Vector3d& in_board_m) const {
     return rotation * in_board_m + translation_m;
   }
 };
 
-double compute_squared_residuals(Corners corners, const Lens& lens, const RigidPose& pose) {
+double square_residuals(Corners corners, const Lens& lens, const RigidPose& pose) {
   double squares = 0;
   for (const auto& corner : corners) {
-    const auto pixel = lens.project_point(pose.transform_to_camera(corner.in_board_m));
+    const auto pixel = lens.project_point(pose.to_camera(corner.in_board_m));
     if (!pixel) return INFINITY;
     squares += corner.weight * corner.weight * (*pixel - corner.pixel).squaredNorm();
   }
@@ -47,8 +47,8 @@ std::optional<RigidPose> compute_pose_step(Corners corners, const Lens& lens, co
   Eigen::Matrix<double, 6, 6> normal = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Matrix<double, 6, 1> right = Eigen::Matrix<double, 6, 1>::Zero();
   for (const auto& corner : corners) {
-    const Eigen::Vector3d point = pose.transform_to_camera(corner.in_board_m);
-    const auto projection = lens.project_point_with_jacobians(point);
+    const Eigen::Vector3d point = pose.to_camera(corner.in_board_m);
+    const auto projection = lens.project_with_jacobians(point);
     if (!projection) return {};
     const Eigen::Vector3d rotated = point - pose.translation_m;
     Eigen::Matrix<double, 2, 6> jacobian;
@@ -72,11 +72,11 @@ std::optional<ViewPose> refine_pose(Corners corners, const Lens& lens, RigidPose
   constexpr int max_iterations = 20;
   constexpr double tolerance = 1e-4;  // relative reduction of the squares by a step
   double damping = 1e-4;
-  double squares = compute_squared_residuals(corners, lens, pose);
+  double squares = square_residuals(corners, lens, pose);
   if (!std::isfinite(squares)) return {};
   for (int step = 0; step < max_iterations; ++step) {
     const auto next = compute_pose_step(corners, lens, pose, damping);
-    const double next_squares = next ? compute_squared_residuals(corners, lens, *next) : INFINITY;
+    const double next_squares = next ? square_residuals(corners, lens, *next) : INFINITY;
     if (next_squares < squares) {
       const bool has_converged = squares - next_squares < tolerance * squares;
       pose = *next;
@@ -102,7 +102,7 @@ RigidPose make_rigid_pose(const PlanarPose& pose) {
 
 }  // namespace
 
-std::optional<ViewPose> estimate_board_view_pose(Corners corners, const Lens& lens) {
+std::optional<ViewPose> estimate_view_pose(Corners corners, const Lens& lens) {
   // Rotates the camera towards the board, which may be 90 degrees off the axis.
   std::vector<std::pair<const BoardLattice::Corner*, Eigen::Vector3d>> rays;
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -124,7 +124,7 @@ std::optional<ViewPose> estimate_board_view_pose(Corners corners, const Lens& le
   }
   if (in_board.size() < 4) return {};
   std::optional<ViewPose> best;
-  for (const PlanarPose& estimate : estimate_planar_poses(in_board, normalized)) {
+  for (const PlanarPose& estimate : list_planar_poses(in_board, normalized)) {
     const RigidPose rotated = make_rigid_pose(estimate);
     const auto pose = refine_pose(corners, lens,
                                   {turned_from_camera.transpose() * rotated.rotation,
@@ -150,17 +150,17 @@ IntrinsicsInput select_views(const IntrinsicsInput& input) {
 
 }  // namespace
 
-InitialPoses estimate_initial_board_poses(const IntrinsicsInput& input, const Lens& lens) {
+InitialPoses estimate_board_poses(const IntrinsicsInput& input, const Lens& lens) {
   InitialPoses initial_poses;
   for (const auto& corners : input.views) {
-    const auto pose = estimate_board_view_pose(corners, lens);
+    const auto pose = estimate_view_pose(corners, lens);
     initial_poses.poses.push_back(pose ? pose->camera_from_board : BoardPose{});
     initial_poses.rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
   }
   return initial_poses;
 }
 
-Lens make_stereographic_lens(const IntrinsicsInput& input, double focal_px) {
+Lens make_initial_lens(const IntrinsicsInput& input, double focal_px) {
   const auto [width, height] = input.imager_px;
   const std::array parameters{focal_px, focal_px, (width - 1) / 2.0, (height - 1) / 2.0};
   return Lens(LensModel::stereographic, parameters);
@@ -173,10 +173,9 @@ std::vector<double> rank_initial_focal_lengths(const IntrinsicsInput& input) {
                 max_half_octaves = 6;  // relative to the width of the image: 0.18 to 8
   for (int half_octaves = min_half_octaves; half_octaves <= max_half_octaves; ++half_octaves) {
     const double focal_px = input.imager_px[0] * std::exp2(half_octaves / 2.0);
-    tried.emplace_back(upper_median(estimate_initial_board_poses(
-                                        selected, make_stereographic_lens(input, focal_px))
-                                        .rms_px),
-                       focal_px);
+    tried.emplace_back(
+        upper_median(estimate_board_poses(selected, make_initial_lens(input, focal_px)).rms_px),
+        focal_px);
   }
   std::sort(tried.begin(), tried.end());
   std::vector<double> order;

@@ -29,8 +29,8 @@ struct ViewPose {
 /// estimated in the undistorted image for a flat board (Collins and Bartoli, "Infinitesimal
 /// plane-based pose estimation", 2014). Both are refined in pixels by the method of Levenberg and
 /// Marquardt. The one with the smaller residual is returned.
-std::optional<ViewPose> estimate_board_view_pose(std::span<const BoardLattice::Corner> corners,
-                                                 const Lens& lens);
+std::optional<ViewPose> estimate_view_pose(std::span<const BoardLattice::Corner> corners,
+                                           const Lens& lens);
 
 /// Initial poses of the board in all views, estimated with one lens. `poses` are camera_from_board,
 /// in the order of IntrinsicsInput::views.
@@ -40,12 +40,12 @@ struct InitialPoses {
   /// IntrinsicsInput::views. Infinity for a view without a pose.
   std::vector<double> rms_px;
 };
-/// Estimates camera_from_board of each view with a lens (estimate_board_view_pose()).
-InitialPoses estimate_initial_board_poses(const IntrinsicsInput& input, const Lens& lens);
+/// Estimates camera_from_board of each view with a lens (estimate_view_pose()).
+InitialPoses estimate_board_poses(const IntrinsicsInput& input, const Lens& lens);
 
 /// Returns a lens of model STEREOGRAPHIC with this focal length, px, and its principal point in the
 /// middle of the image.
-Lens make_stereographic_lens(const IntrinsicsInput& input, double focal_px);
+Lens make_initial_lens(const IntrinsicsInput& input, double focal_px);
 
 /// Returns focal lengths of a geometric series, px, in ascending order of the median RMS residual
 /// of the poses with them.

@@ -18,7 +18,7 @@ namespace {
 /// Returns the points of a board in the order of BoardProblem, row by row.
 std::vector<Eigen::Vector3d> make_board_points(const BoardProblem& problem) {
   std::vector<Eigen::Vector3d> points;
-  points.reserve(problem.num_points_per_board());
+  points.reserve(problem.points_per_board());
   for (int j = 0; j < problem.rows; ++j) {
     for (int i = 0; i < problem.cols; ++i) {
       const Eigen::Array2d normalized_position(2.0 * i / (problem.cols - 1) - 1,
@@ -32,8 +32,9 @@ std::vector<Eigen::Vector3d> make_board_points(const BoardProblem& problem) {
 
 }  // namespace
 
-std::optional<AspectErrorEffect> compute_board_aspect_error_effect_on_lens(
-    const IntrinsicsSolution& solution, double print_sd, const ImageRegion& region) {
+std::optional<AspectErrorEffect> estimate_aspect_effect(const IntrinsicsSolution& solution,
+                                                        double print_sd,
+                                                        const ImageRegion& region) {
   const double aspect_error = std::numbers::sqrt2 * print_sd;
   const Lens lens = solution.fitted_lens();
   BoardProblem problem = solution.problem;
@@ -54,10 +55,10 @@ std::optional<AspectErrorEffect> compute_board_aspect_error_effect_on_lens(
   }
   if (!solve_board_problem(problem, solution.solved_parameters)) return {};
   const Lens printed(problem.lens_model, problem.intrinsics);
-  const auto everywhere = compute_projection_difference(lens, printed, problem.imager_px,
-                                                        [](const Eigen::Vector2d&) { return 1.0; });
-  const auto in_region = compute_projection_difference(
-      lens, printed, problem.imager_px, [&](const Eigen::Vector2d& pixel) {
+  const auto everywhere = compare_projections(lens, printed, problem.imager_px,
+                                              [](const Eigen::Vector2d&) { return 1.0; });
+  const auto in_region =
+      compare_projections(lens, printed, problem.imager_px, [&](const Eigen::Vector2d& pixel) {
         return region.empty() || polygon_contains(region, pixel)
                    ? 1.0
                    : std::numeric_limits<double>::infinity();

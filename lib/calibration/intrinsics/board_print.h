@@ -34,7 +34,8 @@ struct AspectErrorEffect {
 /// @param print_sd  Board::print_sd, > 0
 /// @param region    region where the lens is known (CalibrationReport::region)
 /// @return std::nullopt if that solve fails
-std::optional<AspectErrorEffect> compute_board_aspect_error_effect_on_lens(
-    const IntrinsicsSolution& solution, double print_sd, const ImageRegion& region = {});
+std::optional<AspectErrorEffect> estimate_aspect_effect(const IntrinsicsSolution& solution,
+                                                        double print_sd,
+                                                        const ImageRegion& region = {});
 
 }  // namespace vlp

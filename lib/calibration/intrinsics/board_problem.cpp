@@ -53,7 +53,7 @@ std::optional<PointProjection> project_point(const Lens& lens, const LatticePoin
                                              const Eigen::Matrix3d& left, const BoardPose& pose,
                                              const Eigen::Vector2d& warp_m) {
   const Eigen::Vector3d rotated = rotation * point.apply_warp(warp_m);
-  const auto projection = lens.project_point_with_jacobians(rotated + pose.translation_m);
+  const auto projection = lens.project_with_jacobians(rotated + pose.translation_m);
   if (!projection) return {};
   PointProjection result{projection->pixel, *projection, {}, {}};
   result.d_pixel_d_pose << -projection->d_pixel_d_point * skew_symmetric_matrix(rotated) * left,
@@ -93,7 +93,7 @@ class BoardCost : public ceres::CostFunction {
   /// @param lens  lens of the problem, common to all boards
   BoardCost(const BoardProblem& problem, std::size_t pose, EvaluatedLens& lens)
       : problem_(problem), lens_(lens) {
-    const std::size_t count = problem.num_points_per_board();
+    const std::size_t count = problem.points_per_board();
     for (std::size_t i = 0; i < count; ++i) {
       if (problem.points[pose * count + i].z() > 0) inliers_.push_back(pose * count + i);
     }
@@ -109,11 +109,11 @@ class BoardCost : public ceres::CostFunction {
     const Lens* const lens = lens_.update(intrinsics);
     if (lens == nullptr) return false;
     const BoardPose pose{Eigen::Vector3d(parameters[1]), Eigen::Vector3d(parameters[1] + 3)};
-    const Eigen::Matrix3d rotation = rotation_matrix_from_rotation_vector(pose.rotation),
+    const Eigen::Matrix3d rotation = rotation_from_vector(pose.rotation),
                           left = so3_left_jacobian(pose.rotation);
     const Eigen::Vector2d warp_m(parameters[2]);
     const auto columns = static_cast<Eigen::Index>(intrinsics.size());
-    const std::size_t count = problem_.num_points_per_board();
+    const std::size_t count = problem_.points_per_board();
     using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
     for (std::size_t k = 0; k < inliers_.size(); ++k) {
       const auto row = static_cast<Eigen::Index>(2 * k);
@@ -155,10 +155,10 @@ class BoardCost : public ceres::CostFunction {
 /// Returns the regularization of mrcal as the residuals A (intrinsics - target). Each is a multiple
 /// of the difference of one parameter from its target.
 /// @pre the model is not splined; residuals of splined models have several parameters
-std::unique_ptr<ceres::CostFunction> make_mrcal_regularization(const BoardProblem& problem,
-                                                               const SolveOptions& solve_options) {
+std::unique_ptr<ceres::CostFunction> regularize_as_mrcal(const BoardProblem& problem,
+                                                         const SolveOptions& solve_options) {
   assert(!is_splined_lens_model(problem.lens_model));
-  const Linearization start = linearize_board_problem_by_mrcal(problem, solve_options);
+  const Linearization start = linearize_by_mrcal(problem, solve_options);
   Eigen::VectorXd target = Eigen::Map<const Eigen::VectorXd>(
       problem.intrinsics.data(), static_cast<Eigen::Index>(problem.intrinsics.size()));
   Eigen::MatrixXd factors = Eigen::MatrixXd::Zero(start.regularization.size(), target.size());
@@ -183,8 +183,8 @@ constexpr CeresSettings kFinalSolve{1e-12, 1e4};
 /// Damping slows the convergence of the distortions; near the minimum little is needed.
 constexpr CeresSettings kIntermediateSolve{1e-8, 1e6};
 
-bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_options,
-                               const CeresSettings& settings) {
+bool solve_once(BoardProblem& problem, const SolveOptions& solve_options,
+                const CeresSettings& settings) {
   std::vector<std::array<double, 6>> poses;
   for (const BoardPose& pose : problem.poses) {
     poses.push_back({pose.rotation.x(), pose.rotation.y(), pose.rotation.z(),
@@ -205,8 +205,8 @@ bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_
     order->AddElementToGroup(poses[i].data(), 0);
   }
   if (residuals < intrinsics.size() + 6 * poses.size()) return false;
-  if (solve_options.distortions && is_lens_model_supported_by_mrcal(problem.lens_model)) {
-    equations.AddResidualBlock(make_mrcal_regularization(problem, solve_options).release(), nullptr,
+  if (solve_options.distortions && can_mrcal_solve(problem.lens_model)) {
+    equations.AddResidualBlock(regularize_as_mrcal(problem, solve_options).release(), nullptr,
                                intrinsics.data());
   }
   order->AddElementToGroup(intrinsics.data(), 1);
@@ -238,9 +238,9 @@ bool solve_without_reweighting(BoardProblem& problem, const SolveOptions& solve_
 }
 
 /// Marks corners with a residual beyond 5 sigma on either axis. Returns true if there are any.
-bool mark_outlier_points(BoardProblem& problem) {
+bool mark_outliers(BoardProblem& problem) {
   constexpr double sigmas = 5;
-  auto residuals = compute_reprojection_residuals(problem);
+  auto residuals = compute_board_residuals(problem);
   double squares = 0, count = 0;
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (!(problem.points[i].z() > 0) || !residuals[i].allFinite()) continue;
@@ -270,7 +270,7 @@ bool is_valid_lens(const BoardProblem& problem) {
 /// Fit of a lens to the points that are not outliers.
 struct InlierFit {
   explicit InlierFit(const BoardProblem& problem) {
-    const auto residuals = compute_reprojection_residuals(problem);
+    const auto residuals = compute_board_residuals(problem);
     double squares = 0, count = 0;
     for (std::size_t i = 0; i < residuals.size(); ++i) {
       const double weight = problem.points[i].z();
@@ -291,7 +291,7 @@ struct InlierFit {
 
 }  // namespace
 
-std::vector<Eigen::Vector2d> collect_inlier_corner_pixels(const BoardProblem& problem) {
+std::vector<Eigen::Vector2d> list_inlier_pixels(const BoardProblem& problem) {
   std::vector<Eigen::Vector2d> pixels;
   for (const Eigen::Vector3d& point : problem.points) {
     if (point.z() > 0) pixels.emplace_back(point.head<2>());
@@ -299,64 +299,60 @@ std::vector<Eigen::Vector2d> collect_inlier_corner_pixels(const BoardProblem& pr
   return pixels;
 }
 
-bool is_lens_model_supported_by_mrcal(LensModel model) {
-  return lens_model_name(model).starts_with("LENSMODEL_");
-}
+bool can_mrcal_solve(LensModel model) { return lens_model_name(model).starts_with("LENSMODEL_"); }
 
 bool solve_board_problem(BoardProblem& problem, SolveOptions solve_options) {
   solve_options.distortions = solve_options.distortions && has_distortions(problem);
-  if (!is_lens_model_supported_by_mrcal(problem.lens_model))
-    return solve_board_problem_by_ceres(problem, solve_options) && is_valid_lens(problem);
+  if (!can_mrcal_solve(problem.lens_model))
+    return solve_by_ceres(problem, solve_options) && is_valid_lens(problem);
   constexpr double max_rms_ratio = 1.05;
   const BoardProblem start = problem;
-  if (!solve_board_problem_by_mrcal(problem, solve_options) || !is_valid_lens(problem))
-    return false;
+  if (!solve_by_mrcal(problem, solve_options) || !is_valid_lens(problem)) return false;
   const InlierFit left(problem);
   if (left.projects_all || is_splined_lens_model(problem.lens_model) ||
       !InlierFit(start).projects_all)
     return true;
   BoardProblem without_poles = start;
-  if (solve_board_problem_by_ceres(without_poles, solve_options) &&
+  if (solve_by_ceres(without_poles, solve_options) &&
       !(InlierFit(without_poles).rms_px > max_rms_ratio * left.rms_px)) {
     problem = std::move(without_poles);
   }
   return true;
 }
 
-bool solve_intermediate_board_problem(BoardProblem& problem, SolveOptions solve_options) {
+bool solve_stage(BoardProblem& problem, SolveOptions solve_options) {
   solve_options.distortions = solve_options.distortions && has_distortions(problem);
   solve_options.reject_outliers = false;
   if (!is_splined_lens_model(problem.lens_model) && InlierFit(problem).projects_all &&
-      solve_without_reweighting(problem, solve_options, kIntermediateSolve))
+      solve_once(problem, solve_options, kIntermediateSolve))
     return true;
   return solve_board_problem(problem, solve_options);
 }
 
 Linearization linearize_board_problem(const BoardProblem& problem,
                                       const SolveOptions& solve_options) {
-  return is_lens_model_supported_by_mrcal(problem.lens_model)
-             ? linearize_board_problem_by_mrcal(problem, solve_options)
-             : linearize_board_problem_analytically(problem, solve_options);
+  return can_mrcal_solve(problem.lens_model) ? linearize_by_mrcal(problem, solve_options)
+                                             : linearize_analytically(problem, solve_options);
 }
 
-bool solve_board_problem_by_ceres(BoardProblem& problem, const SolveOptions& solve_options) {
-  if (!solve_without_reweighting(problem, solve_options, kFinalSolve)) return false;
+bool solve_by_ceres(BoardProblem& problem, const SolveOptions& solve_options) {
+  if (!solve_once(problem, solve_options, kFinalSolve)) return false;
   constexpr int max_iterations = 10;
   for (int iteration = 0;
-       solve_options.reject_outliers && iteration < max_iterations && mark_outlier_points(problem);
+       solve_options.reject_outliers && iteration < max_iterations && mark_outliers(problem);
        ++iteration) {
-    if (!solve_without_reweighting(problem, solve_options, kFinalSolve)) return false;
+    if (!solve_once(problem, solve_options, kFinalSolve)) return false;
   }
   return true;
 }
 
-Linearization linearize_board_problem_analytically(const BoardProblem& problem,
-                                                   const SolveOptions& solve_options) {
+Linearization linearize_analytically(const BoardProblem& problem,
+                                     const SolveOptions& solve_options) {
   const auto intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
   const auto boards = static_cast<Eigen::Index>(problem.poses.size());
   const Eigen::Index warp = intrinsics + 6 * boards, states = warp + (solve_options.warp ? 2 : 0);
   const auto rows = static_cast<Eigen::Index>(2 * problem.points.size());
-  const std::size_t count = problem.num_points_per_board();
+  const std::size_t count = problem.points_per_board();
   const Lens lens(problem.lens_model, problem.intrinsics);
   Linearization result;
   result.residuals_px = Eigen::VectorXd::Zero(rows);
@@ -368,7 +364,7 @@ Linearization linearize_board_problem_analytically(const BoardProblem& problem,
     if (!(problem.points[i].z() > 0)) continue;
     const BoardPose& pose = problem.poses[i / count];
     const auto point = project_point(lens, make_lattice_point(problem, i % count),
-                                     rotation_matrix_from_rotation_vector(pose.rotation),
+                                     rotation_from_vector(pose.rotation),
                                      so3_left_jacobian(pose.rotation), pose, problem.warp_m);
     if (!point) continue;
     const auto row = static_cast<Eigen::Index>(2 * i);

@@ -50,13 +50,13 @@ struct BoardProblem {
   };
   std::vector<FixedRay> fixed_rays = {};
 
-  std::size_t num_points_per_board() const {
+  std::size_t points_per_board() const {
     return static_cast<std::size_t>(cols) * static_cast<std::size_t>(rows);
   }
 };
 
 /// Returns the measured pixels of the points that are not outliers.
-std::vector<Eigen::Vector2d> collect_inlier_corner_pixels(const BoardProblem& problem);
+std::vector<Eigen::Vector2d> list_inlier_pixels(const BoardProblem& problem);
 
 /// Parameters that a solve may change in addition to the poses.
 struct SolveOptions {
@@ -85,7 +85,7 @@ bool solve_board_problem(BoardProblem& problem, SolveOptions solve_options);
 /// if Ceres fails.
 /// @pre solve_options.core, unless the lens is splined
 /// @return false if the solve fails
-bool solve_intermediate_board_problem(BoardProblem& problem, SolveOptions solve_options);
+bool solve_stage(BoardProblem& problem, SolveOptions solve_options);
 
 /// Residuals and Jacobian of a problem. State and Jacobian are packed: the state is divided by
 /// `scale`, so that its entries have similar magnitudes.
@@ -109,15 +109,14 @@ Linearization linearize_board_problem(const BoardProblem& problem,
                                       const SolveOptions& solve_options);
 
 /// Returns true if mrcal has the lens model.
-bool is_lens_model_supported_by_mrcal(LensModel model);
+bool can_mrcal_solve(LensModel model);
 /// Implementations of solve_board_problem() and linearize_board_problem() by mrcal and by Ceres.
-bool solve_board_problem_by_mrcal(BoardProblem& problem, const SolveOptions& solve_options);
-bool solve_board_problem_by_ceres(BoardProblem& problem, const SolveOptions& solve_options);
-Linearization linearize_board_problem_by_mrcal(const BoardProblem& problem,
-                                               const SolveOptions& solve_options);
+bool solve_by_mrcal(BoardProblem& problem, const SolveOptions& solve_options);
+bool solve_by_ceres(BoardProblem& problem, const SolveOptions& solve_options);
+Linearization linearize_by_mrcal(const BoardProblem& problem, const SolveOptions& solve_options);
 /// Linearizes with analytic Jacobians, with respect to all intrinsics and poses, and to the warp if
 /// solve_options.warp.
-Linearization linearize_board_problem_analytically(const BoardProblem& problem,
-                                                   const SolveOptions& solve_options);
+Linearization linearize_analytically(const BoardProblem& problem,
+                                     const SolveOptions& solve_options);
 
 }  // namespace vlp

@@ -23,15 +23,15 @@ namespace vlp {
 namespace {
 
 /// Computes the uncertainty over the image: mean and maximum in the region, maximum outside.
-void add_uncertainty_over_image(const ProjectionUncertainty& uncertainty, const Lens& lens,
-                                const std::array<int, 2>& imager_px, CalibrationReport& report) {
+void add_uncertainty(const ProjectionUncertainty& uncertainty, const Lens& lens,
+                     const std::array<int, 2>& imager_px, CalibrationReport& report) {
   double inside = 0;
-  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
     // A fisheye or a spline may end beyond the farthest corner and has no rays there.
     const bool can_end =
         lens.lens_model() == LensModel::fisheye || is_splined_lens_model(lens.lens_model());
     if (can_end && !lens.unproject_pixel(pixel)) continue;
-    const double sigma_px = uncertainty.projection_sd_along_worst_direction_px(pixel);
+    const double sigma_px = uncertainty.worst_direction_sd_px(pixel);
     if (!polygon_contains(report.region, pixel)) {
       report.uncertainty_beyond_px = std::max(report.uncertainty_beyond_px, sigma_px);
       continue;
@@ -45,24 +45,25 @@ void add_uncertainty_over_image(const ProjectionUncertainty& uncertainty, const 
 
 /// Compares the lenses of the even and the odd views; std::nullopt if one of them is not
 /// determined.
-std::optional<ProjectionDifference> compare_lenses_of_view_halves(
-    const IntrinsicsSolution& solution, const IntrinsicsInput& input,
-    const ProjectionUncertainty& uncertainty, const ImageRegion& region) {
-  const IntrinsicsSolution even = solve_intrinsics_from_half_of_views(solution, 0);
-  const IntrinsicsSolution odd = solve_intrinsics_from_half_of_views(solution, 1);
+std::optional<ProjectionDifference> compare_view_halves(const IntrinsicsSolution& solution,
+                                                        const IntrinsicsInput& input,
+                                                        const ProjectionUncertainty& uncertainty,
+                                                        const ImageRegion& region) {
+  const IntrinsicsSolution even = solve_half_of_views(solution, 0);
+  const IntrinsicsSolution odd = solve_half_of_views(solution, 1);
   if (!even.has_succeeded() || !odd.has_succeeded()) return std::nullopt;
   // Half of the views may not determine all parts of a splined lens.
   std::vector<ProjectionUncertainty> halves;
   if (is_splined_lens_model(solution.fitted_lens().lens_model()))
     halves = {{even, input.lattice}, {odd, input.lattice}};
   constexpr double max_ratio = 3;  // typically sqrt(2)
-  return compute_projection_difference(
+  return compare_projections(
       even.fitted_lens(), odd.fitted_lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
-        const double sigma_px = uncertainty.projection_sd_along_worst_direction_px(pixel);
+        const double sigma_px = uncertainty.worst_direction_sd_px(pixel);
         const bool is_determined =
             polygon_contains(region, pixel) &&
             std::ranges::none_of(halves, [&](const ProjectionUncertainty& half) {
-              return half.projection_sd_along_worst_direction_px(pixel) > max_ratio * sigma_px;
+              return half.worst_direction_sd_px(pixel) > max_ratio * sigma_px;
             });
         return is_determined ? sigma_px : std::numeric_limits<double>::infinity();
       });
@@ -70,76 +71,72 @@ std::optional<ProjectionDifference> compare_lenses_of_view_halves(
 
 }  // namespace
 
-CalibrationReport compute_lens_calibration_report(const IntrinsicsSolution& solution,
-                                                  const IntrinsicsInput& input) {
-  return compute_lens_calibration_report(
-      solution, input,
-      ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(solution, input.lattice),
-      compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem), input.imager_px,
-                                solution.fitted_lens()));
+CalibrationReport make_lens_report(const IntrinsicsSolution& solution,
+                                   const IntrinsicsInput& input) {
+  return make_lens_report(solution, input,
+                          ProjectionUncertainty::compare_corners_and_tags(solution, input.lattice),
+                          make_valid_region(list_inlier_pixels(solution.problem), input.imager_px,
+                                            solution.fitted_lens()));
 }
 
-CalibrationReport compute_lens_calibration_report(
-    const IntrinsicsSolution& solution, const IntrinsicsInput& input,
-    const ProjectionUncertainty::ByCornersAndByTags& uncertainties, ImageRegion region) {
+CalibrationReport make_lens_report(const IntrinsicsSolution& solution, const IntrinsicsInput& input,
+                                   const ProjectionUncertainty::ByCornersAndByTags& uncertainties,
+                                   ImageRegion region) {
   const auto& [independent, uncertainty] = uncertainties;
   const Lens lens = solution.fitted_lens();
-  const Eigen::MatrixXd by_views = estimate_intrinsics_covariance_by_jackknife(solution);
+  const Eigen::MatrixXd by_views = jackknife_covariance(solution);
   // Splines are undetermined outside the region.
   const ImageRegion compared = is_splined_lens_model(lens.lens_model()) ? region : ImageRegion();
-  const auto expected = compute_expected_projection_difference(
-      lens, input.imager_px, uncertainty.intrinsics_covariance(), compared);
-  const double region_fraction = compute_region_fraction_of_image_area(region, input.imager_px);
-  CalibrationReport report{
-      std::move(region),
-      region_fraction,
-      0,
-      0,
-      0,
-      uncertainty.focal_x_sd_px(),
-      std::sqrt(by_views(0, 0)),
-      expected.rms_px,
-      compute_expected_projection_difference(lens, input.imager_px, by_views, compared).rms_px,
-      {}};
-  add_uncertainty_over_image(uncertainty, lens, input.imager_px, report);
+  const auto expected =
+      predict_difference(lens, input.imager_px, uncertainty.intrinsics_covariance(), compared);
+  const double region_fraction = compute_area_fraction(region, input.imager_px);
+  CalibrationReport report{std::move(region),
+                           region_fraction,
+                           0,
+                           0,
+                           0,
+                           uncertainty.focal_x_sd_px(),
+                           std::sqrt(by_views(0, 0)),
+                           expected.rms_px,
+                           predict_difference(lens, input.imager_px, by_views, compared).rms_px,
+                           {}};
+  add_uncertainty(uncertainty, lens, input.imager_px, report);
   if (!is_splined_lens_model(lens.lens_model())) {
     // With few views each of these covariances may be too small by chance.
     for (const Eigen::MatrixXd& covariance :
          {uncertainty.intrinsics_covariance(), independent.intrinsics_covariance(), by_views}) {
       if (!covariance.allFinite()) continue;
-      report.uncertainty_worst_px = std::max(report.uncertainty_worst_px,
-                                             estimate_expected_max_projection_difference_px(
-                                                 lens, input.imager_px, covariance, report.region));
+      report.uncertainty_worst_px =
+          std::max(report.uncertainty_worst_px,
+                   predict_max_difference_px(lens, input.imager_px, covariance, report.region));
     }
   }
-  report.split_half_difference =
-      compare_lenses_of_view_halves(solution, input, uncertainty, report.region);
+  report.split_half_difference = compare_view_halves(solution, input, uncertainty, report.region);
   return report;
 }
 
-std::vector<double> compute_held_out_view_residual_rms_px(const IntrinsicsSolution& solution,
-                                                          const IntrinsicsInput& held_out) {
+std::vector<double> compute_held_out_rms_px(const IntrinsicsSolution& solution,
+                                            const IntrinsicsInput& held_out) {
   const Lens lens = solution.fitted_lens();
   auto views = held_out.views;
   for (auto& view : views) {
-    correct_corners_for_edge_curvature(view, lens);
-    view = held_out.lattice.apply_warp_to_board_corners(std::move(view), solution.problem.warp_m);
+    correct_curvature(view, lens);
+    view = held_out.lattice.apply_warp(std::move(view), solution.problem.warp_m);
   }
-  const auto shifts = estimate_tag_edge_displacements(views, lens);
+  const auto shifts = fit_displacements(views, lens);
   std::vector<double> rms_px;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    correct_corners_for_edge_displacement(views[i], shifts[i]);
-    const auto pose = estimate_board_view_pose(views[i], lens);
+    correct_displacement(views[i], shifts[i]);
+    const auto pose = estimate_view_pose(views[i], lens);
     rms_px.push_back(pose ? pose->rms_px : std::numeric_limits<double>::infinity());
   }
   return rms_px;
 }
 
-HeldOutFit evaluate_lens_on_held_out_views(const IntrinsicsSolution& solution,
-                                           const IntrinsicsInput& held_out) {
+HeldOutFit fit_held_out_views(const IntrinsicsSolution& solution, const IntrinsicsInput& held_out) {
   HeldOutFit fit;
   double squares = 0;
-  const auto rms_px = compute_held_out_view_residual_rms_px(solution, held_out);
+  const auto rms_px = compute_held_out_rms_px(solution, held_out);
   for (std::size_t i = 0; i < rms_px.size(); ++i) {
     if (!std::isfinite(rms_px[i])) continue;
     const std::size_t corners = held_out.views[i].size();
@@ -151,21 +148,20 @@ HeldOutFit evaluate_lens_on_held_out_views(const IntrinsicsSolution& solution,
   return fit;
 }
 
-ViewCoverage compute_board_view_coverage(const IntrinsicsSolution& solution,
-                                         const IntrinsicsInput& input) {
+ViewCoverage measure_view_coverage(const IntrinsicsSolution& solution,
+                                   const IntrinsicsInput& input) {
   const auto [width, height] = input.imager_px;
   ViewCoverage coverage;
   ImageCoverage parts(input.imager_px);
   for (const std::size_t view : solution.views) {
     for (const auto& corner : input.views[view]) {
       const double u = corner.pixel.x(), v = corner.pixel.y();
-      ++coverage.corners[static_cast<std::size_t>(
-          ImageCoverage::image_cell_index_along_axis(v, height, 3) * 3 +
-          ImageCoverage::image_cell_index_along_axis(u, width, 3))];
-      parts.add_corner_to_coverage(corner.pixel);
+      ++coverage.corners[static_cast<std::size_t>(ImageCoverage::cell_index(v, height, 3) * 3 +
+                                                  ImageCoverage::cell_index(u, width, 3))];
+      parts.add_corner(corner.pixel);
     }
   }
-  coverage.covered_fraction = parts.covered_image_fraction();
+  coverage.covered_fraction = parts.covered_fraction();
   std::vector<Eigen::Vector3d> normals;
   for (const BoardPose& pose : solution.problem.poses) {
     // Points away from the camera; the board is nearer on the side to which it is tilted.
@@ -188,7 +184,7 @@ ViewCoverage compute_board_view_coverage(const IntrinsicsSolution& solution,
   return coverage;
 }
 
-std::string recommend_next_board_view(const ViewCoverage& coverage) {
+std::string recommend_next_view(const ViewCoverage& coverage) {
   constexpr std::array places{"top left",    "top middle",    "top right",
                               "left middle", "middle",        "right middle",
                               "bottom left", "bottom middle", "bottom right"};

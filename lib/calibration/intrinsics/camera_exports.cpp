@@ -14,7 +14,7 @@ namespace {
 std::string format_list(const std::vector<double>& values) {
   std::string text = "[";
   for (const double value : values) {
-    text.append(text.size() > 1 ? ", " : "").append(format_shortest_exact_number(value));
+    text.append(text.size() > 1 ? ", " : "").append(format_exact_number(value));
   }
   return text + "]";
 }
@@ -61,7 +61,7 @@ std::string quoted_name(const std::string& name) {
   std::string quoted = "'";
   for (const char character : name) {
     const auto byte = static_cast<unsigned char>(character);
-    if (byte < first_printable || byte == del || count_bytes_of_utf8_prefix(name) < name.size()) {
+    if (byte < first_printable || byte == del || count_utf8_prefix(name) < name.size()) {
       throw std::invalid_argument(
           "the camera id contains control characters or is not UTF-8; give another one with "
           "--camera-id");
@@ -82,7 +82,7 @@ std::string opencv_matrix(const char* name, int rows, const std::vector<double>&
 
 }  // namespace
 
-std::string format_ros_camera_info(const Camera& camera) {
+std::string format_ros(const Camera& camera) {
   const LensModel model = camera.lens_model;
   const char* const distortion = ros_distortion(model);
   if (distortion == nullptr)
@@ -103,7 +103,7 @@ std::string format_ros_camera_info(const Camera& camera) {
   return text + "\n";
 }
 
-std::string format_kalibr_camchain(const Camera& camera) {
+std::string format_camchain(const Camera& camera) {
   const bool fisheye = camera.lens_model == LensModel::fisheye;
   if (!fisheye && camera.lens_model != LensModel::pinhole &&
       camera.lens_model != LensModel::opencv4) {
@@ -119,7 +119,7 @@ std::string format_kalibr_camchain(const Camera& camera) {
   return text;
 }
 
-std::string format_opencv_camera(const Camera& camera) {
+std::string format_opencv(const Camera& camera) {
   if (ros_distortion(camera.lens_model) == nullptr && camera.lens_model != LensModel::opencv12) {
     throw_unsupported(camera, "OpenCV", "LENSMODEL_OPENCV8 or OPENCV_FISHEYE");
   }
@@ -131,7 +131,7 @@ std::string format_opencv_camera(const Camera& camera) {
   return text;
 }
 
-std::string format_mrcal_valid_region(const ImageRegion& region) {
+std::string format_mrcal_region(const ImageRegion& region) {
   if (region.empty()) return "";
   std::string text = "    'valid_intrinsics_region': [";
   for (std::size_t i = 0; i <= region.size(); ++i) {  // closed
@@ -141,14 +141,11 @@ std::string format_mrcal_valid_region(const ImageRegion& region) {
   return text + "],\n";
 }
 
-std::string format_mrcal_cameramodel(const Camera& camera, const ImageRegion& region) {
-  if (!is_lens_model_supported_by_mrcal(camera.lens_model))
-    throw_unsupported(camera, "mrcal", "LENSMODEL_OPENCV8");
+std::string format_cameramodel(const Camera& camera, const ImageRegion& region) {
+  if (!can_mrcal_solve(camera.lens_model)) throw_unsupported(camera, "mrcal", "LENSMODEL_OPENCV8");
   std::string text = "{\n    'lensmodel':  '";
   text.append(lens_model_name(camera.lens_model)).append("',\n    'intrinsics': ");
-  text.append(format_list(camera.intrinsics))
-      .append(",\n")
-      .append(format_mrcal_valid_region(region));
+  text.append(format_list(camera.intrinsics)).append(",\n").append(format_mrcal_region(region));
   text.append("    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ");
   text.append(std::to_string(camera.imager_px[0])).append(", ");
   text.append(std::to_string(camera.imager_px[1])).append(" ]\n}\n");

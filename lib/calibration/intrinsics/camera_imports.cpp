@@ -161,7 +161,7 @@ std::vector<double> parse_yaml_numbers(const YAML::Node& node) {
 
 /// Returns the lens model and removes trailing coefficients of zero. The last two of OpenCV's 14
 /// coefficients tilt the sensor and must be 0. If all are zero, the model is a pinhole.
-LensModel find_lens_model(const std::string& name, std::vector<double>& distortions) {
+LensModel require_lens_model(const std::string& name, std::vector<double>& distortions) {
   constexpr std::size_t with_tilt = 14, without = 12;
   if (name == "fisheye" || name == "equidistant") {
     if (distortions.size() != 4) throw std::invalid_argument(name + " has four coefficients");
@@ -205,7 +205,7 @@ Camera parse_yaml_camera(const YAML::Node& document) {
     camera.intrinsics = parse_yaml_numbers(kalibr["intrinsics"]);
     const auto model = kalibr["distortion_model"].as<std::string>("none");
     if (model != "none") distortions = parse_yaml_numbers(kalibr["distortion_coeffs"]);
-    camera.lens_model = find_lens_model(model, distortions);
+    camera.lens_model = require_lens_model(model, distortions);
     camera.imager_px = kalibr["resolution"].as<std::array<int, 2>>();
   } else {
     const auto matrix = parse_yaml_numbers(document["camera_matrix"]);
@@ -216,7 +216,7 @@ Camera parse_yaml_camera(const YAML::Node& document) {
     distortions = parse_yaml_numbers(document["distortion_coefficients"]);
     std::string model = document["distortion_model"].as<std::string>("");
     if (model.empty() && document["fisheye_model"].as<int>(0) != 0) model = "fisheye";
-    camera.lens_model = find_lens_model(model, distortions);
+    camera.lens_model = require_lens_model(model, distortions);
     camera.imager_px = {document["image_width"].as<int>(), document["image_height"].as<int>()};
     if (const YAML::Node name = document["camera_name"]) camera.id = name.as<std::string>();
   }
@@ -242,7 +242,7 @@ LensFit measure_lens_fit(const std::vector<double>& parameters, LensModel model,
   step.normal = Eigen::MatrixXd::Zero(size, size);
   step.right = Eigen::VectorXd::Zero(size);
   for (const auto& [pixel, ray] : rays) {
-    const auto at = lens.project_point_with_jacobians(ray);
+    const auto at = lens.project_with_jacobians(ray);
     if (!at) continue;
     const Eigen::Vector2d residual = pixel - at->pixel;
     step.squares += residual.squaredNorm();
@@ -256,12 +256,12 @@ LensFit measure_lens_fit(const std::vector<double>& parameters, LensModel model,
 /// Fits the parameters of a lens model to the rays of another lens by the method of Levenberg and
 /// Marquardt. Parameters of a splined lens are kept. Throws std::invalid_argument if the model has
 /// no lens close to the other one.
-void fit_lens_parameters(const Camera& camera, const Lens& from, LensModel model,
-                         std::vector<double>& parameters) {
+void fit_parameters(const Camera& camera, const Lens& from, LensModel model,
+                    std::vector<double>& parameters) {
   constexpr int max_iterations = 200;
   constexpr double function_tolerance = 1e-12, min_damping = 1e-12, max_damping = 1e12;
   std::vector<std::pair<Eigen::Vector2d, Eigen::Vector3d>> rays;
-  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(camera.imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(camera.imager_px)) {
     if (const auto ray = from.unproject_pixel(pixel)) rays.emplace_back(pixel, ray->direction);
   }
   double damping = 1e-3;
@@ -269,7 +269,7 @@ void fit_lens_parameters(const Camera& camera, const Lens& from, LensModel model
   for (int i = 0; i < max_iterations && fit.count > 0 && !is_splined_lens_model(model); ++i) {
     Eigen::MatrixXd damped = fit.normal;
     damped.diagonal() *= 1 + damping;
-    const Eigen::VectorXd change = solve_symmetric_system(damped, fit.right);
+    const Eigen::VectorXd change = solve_symmetric(damped, fit.right);
     std::vector<double> next = parameters;
     for (std::size_t k = 0; k < next.size(); ++k) next[k] += change[static_cast<Eigen::Index>(k)];
     const bool is_possible = change.allFinite() && next[0] > 0 && next[1] > 0;
@@ -298,10 +298,10 @@ void fit_lens_parameters(const Camera& camera, const Lens& from, LensModel model
 
 /// Measures the largest difference between two lenses on a finer grid than that of the fit, and the
 /// fraction of the image that both project to.
-void set_lens_differences(const Lens& from, const Lens& to, const std::array<int, 2>& imager_px,
-                          FittedCamera& fitted) {
+void set_differences(const Lens& from, const Lens& to, const std::array<int, 2>& imager_px,
+                     FittedCamera& fitted) {
   constexpr int points_per_row = 201;
-  const auto pixels = make_regular_pixel_grid(imager_px, points_per_row);
+  const auto pixels = make_pixel_grid(imager_px, points_per_row);
   std::size_t num_common = 0;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = from.unproject_pixel(pixel);
@@ -315,7 +315,7 @@ void set_lens_differences(const Lens& from, const Lens& to, const std::array<int
 
 }  // namespace
 
-ImportedCamera read_camera_of_any_format(const fs::path& file) {
+ImportedCamera read_any_camera(const fs::path& file) {
   std::string text = read_file(file, kMaxCameraBytes);
   ImportedCamera found;
   Camera& camera = found.camera;
@@ -360,7 +360,7 @@ ImportedCamera read_camera_of_any_format(const fs::path& file) {
   return found;
 }
 
-FittedCamera convert_camera_to_lens_model(const Camera& camera, LensModel model) {
+FittedCamera convert_lens_model(const Camera& camera, LensModel model) {
   if (camera.lens_model == model) return {camera, 0, 1};
   const Lens from(camera.lens_model, camera.intrinsics);
   FittedCamera fitted{camera, 0, 0};
@@ -371,17 +371,16 @@ FittedCamera convert_camera_to_lens_model(const Camera& camera, LensModel model)
       num_lens_parameters(is_splined_lens_model(model) ? LensModel::stereographic : model), 0);
   if (is_splined_lens_model(model)) {
     if (camera.lens_model != LensModel::stereographic) {
-      parameters = convert_camera_to_lens_model(camera, LensModel::stereographic).camera.intrinsics;
+      parameters = convert_lens_model(camera, LensModel::stereographic).camera.intrinsics;
     }
-    const auto splined = fit_splined_lens_to_lens(from, camera.imager_px, model, parameters);
+    const auto splined = fit_splined_lens(from, camera.imager_px, model, parameters);
     if (!splined) {
-      throw std::invalid_argument(
-          describe_too_coarse_spline_grid(from, camera.imager_px, model, parameters));
+      throw std::invalid_argument(explain_coarse_grid(from, camera.imager_px, model, parameters));
     }
     parameters = *splined;
   }
-  fit_lens_parameters(camera, from, model, parameters);
-  set_lens_differences(from, Lens(model, parameters), camera.imager_px, fitted);
+  fit_parameters(camera, from, model, parameters);
+  set_differences(from, Lens(model, parameters), camera.imager_px, fitted);
   return fitted;
 }
 

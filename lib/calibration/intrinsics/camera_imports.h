@@ -24,7 +24,7 @@ struct ImportedCamera {
 ///   ROS camera_info: plumb_bob, rational_polynomial, equidistant
 ///   Kalibr's camchain, its cam0: pinhole with radtan, equidistant or none
 /// @throws InputError, also for skewed camera matrices and for an empty valid_intrinsics_region
-ImportedCamera read_camera_of_any_format(const std::filesystem::path& file);
+ImportedCamera read_any_camera(const std::filesystem::path& file);
 
 /// Camera whose lens was replaced by one of another model.
 struct FittedCamera {
@@ -34,10 +34,10 @@ struct FittedCamera {
   double worst_px, common_fraction;
 };
 /// Fits a lens of another model to the rays of a camera over the image, by least squares in pixels
-/// (make_regular_pixel_grid(); splined lenses: fit_splined_lens_to_lens()). Returns a camera that
+/// (make_pixel_grid(); splined lenses: fit_splined_lens()). Returns a camera that
 /// already has the model unchanged.
 /// @throws std::invalid_argument if no lens of the model is close to the camera's; if a splined
 ///     model has too few control points in the field of view
-FittedCamera convert_camera_to_lens_model(const Camera& camera, LensModel model);
+FittedCamera convert_lens_model(const Camera& camera, LensModel model);
 
 }  // namespace vlp

@@ -19,7 +19,7 @@ struct CornerLamps {
   /// All corners of the board, below the camera (LampMap::lamps_below_camera). World: x right and y
   /// up on the board as printed, z towards the viewer, origin at the bottom left corner. Ids: 4 tag
   /// + corner, with corner 0 to 3 as in BoardTag::corners_m; on boards of squares the index of
-  /// list_chessboard_corners_m().
+  /// list_inner_corners_m().
   LampMap map;
   /// Corners of each view; every n-th one if a fix does not take all of them.
   std::vector<Frame> frames;
@@ -36,8 +36,8 @@ struct CornerLamps {
 /// @param sigma_px  standard deviation of corners that state none, per axis; divided by the weight
 ///     of a point (PointDetection::weight). std::nullopt: estimate_corner_noise_px()
 /// @param sd_m  standard deviation of the positions on the board, per axis; std::nullopt: exact
-CornerLamps convert_corners_to_lamps(std::span<const BoardView> views, const Board& board,
-                                     const std::optional<double>& sigma_px,
-                                     const std::optional<double>& sd_m);
+CornerLamps make_corner_lamps(std::span<const BoardView> views, const Board& board,
+                              const std::optional<double>& sigma_px,
+                              const std::optional<double>& sd_m);
 
 }  // namespace vlp

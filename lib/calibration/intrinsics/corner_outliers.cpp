@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kNeighbors = 8, kPatchNeighbors = 15;
 
 /// Returns the nearest corners on the board, without those in `is_outlier`.
-std::vector<std::size_t> find_nearest_corners(const std::vector<BoardLattice::Corner>& corners,
+std::vector<std::size_t> list_nearest_corners(const std::vector<BoardLattice::Corner>& corners,
                                               const std::vector<bool>& is_outlier,
                                               std::size_t middle, std::size_t max_count) {
   std::vector<std::pair<double, std::size_t>> away;
@@ -35,8 +35,8 @@ std::vector<std::size_t> find_nearest_corners(const std::vector<BoardLattice::Co
 
 /// Returns the distance of a corner from its predicted position, relative to the limit; 0 with too
 /// few neighbors.
-double compute_displacement_ratio(const std::vector<BoardLattice::Corner>& corners,
-                                  const std::vector<std::size_t>& nearest, std::size_t middle) {
+double compute_shift_ratio(const std::vector<BoardLattice::Corner>& corners,
+                           const std::vector<std::size_t>& nearest, std::size_t middle) {
   constexpr double max_fraction = 0.25, min_px = 3;
   if (nearest.size() < kNeighbors) return 0;
   std::vector<PlanePair> pairs;
@@ -59,9 +59,9 @@ double compute_displacement_ratio(const std::vector<BoardLattice::Corner>& corne
 
 /// Adds the squared residuals of a patch of corners, times their weights: of a homography, minus
 /// their cubic polynomial on the board, which is due to the lens. Returns the degrees of freedom.
-double add_squared_patch_residuals(const std::vector<BoardLattice::Corner>& corners,
-                                   const std::vector<std::size_t>& patch,
-                                   std::vector<double>& squares_px2) {
+double add_patch_residuals(const std::vector<BoardLattice::Corner>& corners,
+                           const std::vector<std::size_t>& patch,
+                           std::vector<double>& squares_px2) {
   constexpr double rank_tolerance = 1e-6;
   std::vector<PlanePair> pairs;
   pairs.reserve(patch.size());
@@ -92,14 +92,14 @@ double add_squared_patch_residuals(const std::vector<BoardLattice::Corner>& corn
 
 }  // namespace
 
-std::vector<std::size_t> find_corner_outliers(const std::vector<BoardLattice::Corner>& corners) {
+std::vector<std::size_t> list_corner_outliers(const std::vector<BoardLattice::Corner>& corners) {
   constexpr std::size_t min_corners_per_outlier = 10;  // at most one in ten
   std::vector<bool> is_outlier(corners.size(), false);
   std::vector<std::vector<std::size_t>> nearest(corners.size());
   std::vector<double> ratios(corners.size());
   const auto test_corner = [&](std::size_t i) {
-    nearest[i] = find_nearest_corners(corners, is_outlier, i, kNeighbors);
-    ratios[i] = compute_displacement_ratio(corners, nearest[i], i);
+    nearest[i] = list_nearest_corners(corners, is_outlier, i, kNeighbors);
+    ratios[i] = compute_shift_ratio(corners, nearest[i], i);
   };
   for (std::size_t i = 0; i < corners.size(); ++i) test_corner(i);
   std::vector<std::size_t> found;
@@ -139,13 +139,13 @@ std::optional<double> estimate_corner_noise_px(
     const std::size_t step = 1 + corners.size() / max_patches_per_view;
     for (std::size_t middle = 0; middle < corners.size(); middle += step) {
       std::vector<std::size_t> patch =
-          find_nearest_corners(corners, no_outliers, middle, kPatchNeighbors);
+          list_nearest_corners(corners, no_outliers, middle, kPatchNeighbors);
       patch.push_back(middle);
-      freedom += add_squared_patch_residuals(corners, patch, squares_px2);
+      freedom += add_patch_residuals(corners, patch, squares_px2);
     }
   }
   if (squares_px2.empty()) return std::nullopt;
-  return std::sqrt(estimate_robust_variance_2d(std::move(squares_px2), freedom));
+  return std::sqrt(estimate_variance_2d(std::move(squares_px2), freedom));
 }
 
 }  // namespace vlp

@@ -24,10 +24,10 @@ namespace vlp {
 ///
 /// Each corner is predicted by the homography of its nearest eight corners on the board, which
 /// approximates any lens. The worst corner is removed and its neighbors are tested again.
-std::vector<std::size_t> find_corner_outliers(const std::vector<BoardLattice::Corner>& corners);
+std::vector<std::size_t> list_corner_outliers(const std::vector<BoardLattice::Corner>& corners);
 
 /// Estimates the noise of corners of weight 1, px per axis, without a lens: from the residuals of
-/// a homography with cubic terms for each 16 neighboring corners (estimate_robust_variance_2d()).
+/// a homography with cubic terms for each 16 neighboring corners (estimate_variance_2d()).
 /// Errors that neighbors share are not included. Returns std::nullopt if no view has 16 corners.
 std::optional<double> estimate_corner_noise_px(
     std::span<const std::vector<BoardLattice::Corner>> views);

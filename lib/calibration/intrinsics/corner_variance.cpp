@@ -30,7 +30,7 @@ double compute_typical_variance(std::span<const CornerError> errors, const Prope
 
 }  // namespace
 
-CornerVariance estimate_corner_variance_floor_and_scale(std::span<const CornerError> errors) {
+CornerVariance fit_corner_variance(std::span<const CornerError> errors) {
   constexpr int max_iterations = 10;
   constexpr double min_fraction = 0.002;  // of the mean square: no corner dominates
   // Starts with half of the variance from pixel noise. Started with the floor alone, one corner
@@ -46,7 +46,7 @@ CornerVariance estimate_corner_variance_floor_and_scale(std::span<const CornerEr
     Eigen::Vector2d right = Eigen::Vector2d::Zero();
     double known_px2 = 0;
     for (const auto& [square_px2, sd_px] : errors) {
-      const double expected = variance.corner_variance_px2(sd_px);
+      const double expected = variance.variance_px2(sd_px);
       const Eigen::Vector2d row = Eigen::Vector2d(1, sd_px * sd_px) / expected;
       normal += row * row.transpose();
       const double square = std::min(square_px2 / expected, kMaxSigmas * kMaxSigmas);
@@ -64,21 +64,19 @@ CornerVariance estimate_corner_variance_floor_and_scale(std::span<const CornerEr
 
 CornerWeights::CornerWeights(std::span<const CornerError> known,
                              std::span<const CornerError> unknown)
-    : variance_(estimate_corner_variance_floor_and_scale(known)), mean_px2_(0) {
+    : variance_(fit_corner_variance(known)), mean_px2_(0) {
   for (const auto& [square_px2, sd_px] : known) {
-    mean_px2_ +=
-        std::min(square_px2, kMaxSigmas * kMaxSigmas * variance_.corner_variance_px2(sd_px)) /
-        static_cast<double>(known.size());
+    mean_px2_ += std::min(square_px2, kMaxSigmas * kMaxSigmas * variance_.variance_px2(sd_px)) /
+                 static_cast<double>(known.size());
   }
   unknown_px2_ = mean_px2_;
   if (std::ranges::any_of(unknown, [](const auto& error) { return error.square_px2 > 0; })) {
-    unknown_px2_ = std::max(
-        mean_px2_, estimate_corner_variance_floor_and_scale(unknown).corner_variance_px2(0));
+    unknown_px2_ = std::max(mean_px2_, fit_corner_variance(unknown).variance_px2(0));
   }
 }
 
 double CornerWeights::corner_weight(double sd_px) const {
-  return std::sqrt(mean_px2_ / (sd_px > 0 ? variance_.corner_variance_px2(sd_px) : unknown_px2_));
+  return std::sqrt(mean_px2_ / (sd_px > 0 ? variance_.variance_px2(sd_px) : unknown_px2_));
 }
 
 }  // namespace vlp

@@ -26,7 +26,7 @@ struct CornerVariance {
 
   /// Returns the variance of a corner per axis, px^2. `sd_px` is its standard deviation from pixel
   /// noise.
-  double corner_variance_px2(double sd_px) const { return floor_px2 + scale2 * sd_px * sd_px; }
+  double variance_px2(double sd_px) const { return floor_px2 + scale2 * sd_px * sd_px; }
 };
 
 /// Estimates the variance components by least squares of the squared residuals, each divided by its
@@ -35,7 +35,7 @@ struct CornerVariance {
 /// A residual beyond three standard deviations counts as three. The standard deviation of a corner
 /// is at least 4 % of the RMS residual of all, so that no corner dominates.
 /// @pre at least one error, not all of them 0; standard deviations are finite
-CornerVariance estimate_corner_variance_floor_and_scale(std::span<const CornerError> errors);
+CornerVariance fit_corner_variance(std::span<const CornerError> errors);
 
 /// Factors by which a solve multiplies residuals:
 ///   weight^2 = mean of the squared residuals / variance.

@@ -30,10 +30,9 @@ struct Chord {
 
 /// Returns the distance, px, outside of a chord at which the lens projects the straight line
 /// between its ends, at w.
-std::optional<double> compute_edge_sagitta_by_lens(const Chord& chord,
-                                                   const Eigen::Vector3d& from_ray,
-                                                   const Eigen::Vector3d& to_ray, const Lens& lens,
-                                                   double w) {
+std::optional<double> compute_lens_sagitta(const Chord& chord, const Eigen::Vector3d& from_ray,
+                                           const Eigen::Vector3d& to_ray, const Lens& lens,
+                                           double w) {
   constexpr int max_iterations = 3;
   const Eigen::Vector2d length = chord.to - chord.from;
   double fraction = (1 + w) / 2;
@@ -52,12 +51,12 @@ struct DisplacedEdge {
   EdgeCurvature curvature;
 };
 
-std::optional<DisplacedEdge> compute_displaced_edge(const Chord& chord, const EdgeCurvature& seen,
-                                                    const Lens& lens) {
+std::optional<DisplacedEdge> displace_edge(const Chord& chord, const EdgeCurvature& seen,
+                                           const Lens& lens) {
   const auto from_ray = lens.unproject_pixel(chord.from), to_ray = lens.unproject_pixel(chord.to);
   if (!from_ray || !to_ray) return {};
   const auto lens_at = [&](double w) {
-    return compute_edge_sagitta_by_lens(chord, from_ray->direction, to_ray->direction, lens, w);
+    return compute_lens_sagitta(chord, from_ray->direction, to_ray->direction, lens, w);
   };
   // Nodes and weights of Gauss-Legendre quadrature.
   constexpr std::array<std::array<double, 2>, 4> rule{{{-0.8611363115940526, 0.3478548451374538},
@@ -69,7 +68,7 @@ std::optional<DisplacedEdge> compute_displaced_edge(const Chord& chord, const Ed
     const double w = seen.reach * place;
     const auto lens_offset = lens_at(w);
     if (!lens_offset) return {};
-    const double difference = seen.curve_offset_from_straight_line_px(w) - *lens_offset;
+    const double difference = seen.curve_offset_px(w) - *lens_offset;
     mean += weight / 2 * difference;
     slope += 3 * weight / 2 * difference * place / seen.reach;
   }
@@ -81,8 +80,7 @@ std::optional<DisplacedEdge> compute_displaced_edge(const Chord& chord, const Ed
 
 }  // namespace
 
-double correct_corners_for_edge_curvature(std::vector<BoardLattice::Corner>& corners,
-                                          const Lens& lens) {
+double correct_curvature(std::vector<BoardLattice::Corner>& corners, const Lens& lens) {
   constexpr double max_fraction = 0.25;  // of an edge; beyond it the corner or the edges are wrong
   double max_displacement_px = 0;
   for (std::size_t first = 0; first + 4 <= corners.size(); first += 4) {
@@ -98,7 +96,7 @@ double correct_corners_for_edge_curvature(std::vector<BoardLattice::Corner>& cor
                  next = static_cast<std::ptrdiff_t>((k + 1) % 4);
       const Chord chord(tag[at].pixel, tag[next].pixel, inside);
       outwards[k] = chord.outwards;
-      edges[k] = compute_displaced_edge(chord, tag[at].curvature, lens);
+      edges[k] = displace_edge(chord, tag[at].curvature, lens);
     }
     if (!std::all_of(edges.begin(), edges.end(), [](const auto& edge) { return edge; })) continue;
     std::array<Eigen::Vector2d, 4> steps;
@@ -144,18 +142,18 @@ struct DisplacementEquations {
     Column sum = right;
     all.diagonal().tail<4>() += weights;
     sum.tail<4>() += weights.cwiseProduct(prior);
-    const Column solution = solve_symmetric_system(all, sum);
+    const Column solution = solve_symmetric(all, sum);
     EdgeDisplacement result = shift;
     if (solution.allFinite()) result.coefficients = solution.tail<4>();
     return result;
   }
 };
 
-DisplacementEquations make_displacement_equations(const std::vector<BoardLattice::Corner>& corners,
-                                                  const Lens& lens) {
+DisplacementEquations make_equations(const std::vector<BoardLattice::Corner>& corners,
+                                     const Lens& lens) {
   constexpr std::size_t min_corners = 12;
   if (corners.size() < min_corners || corners.front().d_pixel_d_edge_shift.isZero(0)) return {};
-  const auto pose = estimate_board_view_pose(corners, lens);
+  const auto pose = estimate_view_pose(corners, lens);
   if (!pose) return {};
   DisplacementEquations equations;
   const auto count = static_cast<double>(corners.size());
@@ -166,10 +164,10 @@ DisplacementEquations make_displacement_equations(const std::vector<BoardLattice
   }
   equations.shift.radius_px = std::max(1.0, std::sqrt(squares));
   const auto& [rotation, translation_m] = pose->camera_from_board;
-  const Eigen::Matrix3d rotation_matrix = rotation_matrix_from_rotation_vector(rotation);
+  const Eigen::Matrix3d rotation_matrix = rotation_from_vector(rotation);
   for (const auto& corner : corners) {
     const Eigen::Vector3d rotated = rotation_matrix * corner.in_board_m;
-    const auto projection = lens.project_point_with_jacobians(rotated + translation_m);
+    const auto projection = lens.project_with_jacobians(rotated + translation_m);
     if (!projection) return {};
     const Eigen::Vector2d x = (corner.pixel - equations.shift.middle) / equations.shift.radius_px;
     Eigen::Matrix<double, 2, kUnknowns> jacobian;
@@ -186,7 +184,7 @@ DisplacementEquations make_displacement_equations(const std::vector<BoardLattice
 
 }  // namespace
 
-std::vector<EdgeDisplacement> estimate_tag_edge_displacements(
+std::vector<EdgeDisplacement> fit_displacements(
     std::span<const std::vector<BoardLattice::Corner>> views, const Lens& lens,
     DisplacementForm form) {
   // Corner noise of 0.05 px; shifts differ by 0.1 px from view to view and within a view.
@@ -197,7 +195,7 @@ std::vector<EdgeDisplacement> estimate_tag_edge_displacements(
   std::vector<DisplacementEquations> equations;
   std::vector<double> alone_px;
   for (const auto& corners : views) {
-    equations.push_back(make_displacement_equations(corners, lens));
+    equations.push_back(make_equations(corners, lens));
     if (equations.back().is_valid) {
       alone_px.push_back(
           equations.back().solve_with_prior(Eigen::Vector4d::Zero(), weak_weights).coefficients[0]);
@@ -216,11 +214,11 @@ std::vector<EdgeDisplacement> estimate_tag_edge_displacements(
   return shifts;
 }
 
-double correct_corners_for_edge_displacement(std::vector<BoardLattice::Corner>& corners,
-                                             const EdgeDisplacement& shift) {
+double correct_displacement(std::vector<BoardLattice::Corner>& corners,
+                            const EdgeDisplacement& shift) {
   double sum_px = 0;
   for (auto& corner : corners) {
-    const double shift_px = shift.inward_displacement_at_pixel_px(corner.pixel);
+    const double shift_px = shift.inward_shift_px(corner.pixel);
     corner.pixel -= shift_px * corner.d_pixel_d_edge_shift;
     sum_px += shift_px;
   }

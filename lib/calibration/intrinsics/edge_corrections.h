@@ -29,8 +29,7 @@ namespace vlp {
 /// A tag is not changed if the curvature of an edge is unknown (touching squares, files without
 /// it). It is not changed if the lens does not describe one of its edges. It is also not changed if
 /// a corner would move by 25 % of an edge or more.
-double correct_corners_for_edge_curvature(std::vector<BoardLattice::Corner>& corners,
-                                          const Lens& lens);
+double correct_curvature(std::vector<BoardLattice::Corner>& corners, const Lens& lens);
 
 /// Displacement of the tag edges in a view inwards, towards the dark, as a function of the pixel:
 ///   shift = coefficients . (1, x, y, x^2 + y^2),  (x, y) = (pixel - middle) / radius_px,  px.
@@ -41,7 +40,7 @@ struct EdgeDisplacement {
   double radius_px = 1;
 
   /// Returns the inward displacement of a tag edge at a pixel of the image, px. Negative: outwards.
-  double inward_displacement_at_pixel_px(const Eigen::Vector2d& pixel) const {
+  double inward_shift_px(const Eigen::Vector2d& pixel) const {
     const Eigen::Vector2d x = (pixel - middle) / radius_px;
     return coefficients.dot(Eigen::Vector4d(1, x.x(), x.y(), x.squaredNorm()));
   }
@@ -64,12 +63,12 @@ enum class DisplacementForm { constant, varying };
 ///
 /// Use DisplacementForm::constant as long as the warp of the board is unknown: a varying shift
 /// would absorb it.
-std::vector<EdgeDisplacement> estimate_tag_edge_displacements(
+std::vector<EdgeDisplacement> fit_displacements(
     std::span<const std::vector<BoardLattice::Corner>> views, const Lens& lens,
     DisplacementForm form = DisplacementForm::varying);
 
 /// Moves the edges back by a shift. Returns the mean displacement, px.
-double correct_corners_for_edge_displacement(std::vector<BoardLattice::Corner>& corners,
-                                             const EdgeDisplacement& shift);
+double correct_displacement(std::vector<BoardLattice::Corner>& corners,
+                            const EdgeDisplacement& shift);
 
 }  // namespace vlp

@@ -43,9 +43,9 @@ ViewFit measure_view_fit(const BoardProblem& problem, const std::vector<Eigen::V
 
 }  // namespace
 
-InconsistentViews find_views_inconsistent_with_lens(const IntrinsicsSolution& solution) {
+InconsistentViews test_view_consistency(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
-  const auto residuals = compute_reprojection_residuals(problem);
+  const auto residuals = compute_board_residuals(problem);
   const std::size_t points_of_view = problem.points.size() / solution.views.size();
   std::vector<ViewFit> fits;
   std::vector<double> medians_px;
@@ -76,8 +76,8 @@ InconsistentViews find_views_inconsistent_with_lens(const IntrinsicsSolution& so
   return found;
 }
 
-std::string describe_inconsistent_views(const InconsistentViews& found,
-                                        const std::vector<std::string>& images) {
+std::string describe_bad_views(const InconsistentViews& found,
+                               const std::vector<std::string>& images) {
   std::string names;
   for (std::size_t i = 0; i < std::min(found.views.size(), kMaxNames); ++i) {
     names.append(names.empty() ? "" : ", ").append(images[found.views[i]]);

@@ -38,12 +38,12 @@ struct InconsistentViews {
 /// at least 3.3, at least 18 % outliers. One camera, rendered and real: at most 2.6 and 8 %. Two
 /// cameras whose lenses differ by less than the residuals cannot be distinguished.
 /// @pre solution.has_succeeded()
-InconsistentViews find_views_inconsistent_with_lens(const IntrinsicsSolution& solution);
+InconsistentViews test_view_consistency(const IntrinsicsSolution& solution);
 
 /// Describes the views in one line: "3 board images do not fit the other 33: 0005.png, ...".
 /// `images`: images of the input of the solve.
 /// @pre found.views is not empty
-std::string describe_inconsistent_views(const InconsistentViews& found,
-                                        const std::vector<std::string>& images);
+std::string describe_bad_views(const InconsistentViews& found,
+                               const std::vector<std::string>& images);
 
 }  // namespace vlp

@@ -28,7 +28,7 @@
 
 namespace vlp {
 
-std::string_view describe_intrinsics_status(IntrinsicsStatus status) {
+std::string_view describe_status(IntrinsicsStatus status) {
   switch (status) {
     case IntrinsicsStatus::ok:
       return "ok";
@@ -45,10 +45,10 @@ std::string_view describe_intrinsics_status(IntrinsicsStatus status) {
   return "";
 }
 
-void IntrinsicsSolution::update_lens_fit_statistics() {
+void IntrinsicsSolution::update_statistics() {
   double squares = 0;
   corners = outliers = 0;
-  const auto residuals = compute_reprojection_residuals(problem);
+  const auto residuals = compute_board_residuals(problem);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     const double weight = problem.points[i].z();
     if (weight > 0) {
@@ -61,12 +61,12 @@ void IntrinsicsSolution::update_lens_fit_statistics() {
   rms_px = std::sqrt(squares / (2 * std::max(1, corners)));
 }
 
-std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& problem) {
+std::vector<Eigen::Vector2d> compute_board_residuals(const BoardProblem& problem) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const Lens lens(problem.lens_model, problem.intrinsics);
   std::vector<Eigen::Vector2d> residuals(problem.points.size(), Eigen::Vector2d::Constant(nan));
   const std::size_t cols = static_cast<std::size_t>(problem.cols),
-                    count = problem.num_points_per_board();
+                    count = problem.points_per_board();
   const Eigen::Array2d last(problem.cols - 1, problem.rows - 1);
   for (std::size_t pose = 0; pose < problem.poses.size(); ++pose) {
     const Eigen::Vector3d& r = problem.poses[pose].rotation;
@@ -98,16 +98,15 @@ Eigen::Vector3d compute_board_normal(const BoardPose& pose) {
          Eigen::Vector3d::UnitZ();
 }
 
-void rotate_all_board_poses(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
+void rotate_boards(std::vector<BoardPose>& poses, const Eigen::Matrix3d& new_from_old) {
   for (BoardPose& pose : poses) {
-    const Eigen::AngleAxisd rotation(new_from_old *
-                                     rotation_matrix_from_rotation_vector(pose.rotation));
+    const Eigen::AngleAxisd rotation(new_from_old * rotation_from_vector(pose.rotation));
     pose = {rotation.angle() * rotation.axis(), new_from_old * pose.translation_m};
   }
 }
 
 /// Returns true if all board normals lie within five degrees of each other.
-bool are_all_boards_parallel(const BoardProblem& problem) {
+bool are_boards_parallel(const BoardProblem& problem) {
   constexpr double min_rad = 0.09;  // five degrees
   double widest_rad = 0;
   for (const BoardPose& a : problem.poses) {
@@ -135,37 +134,37 @@ class IntrinsicsSolver {
   explicit IntrinsicsSolver(const IntrinsicsInput& input);
 
   /// Stage 2, from an initial focal length.
-  bool solve_intrinsics_from_focal_length(double focal_px);
+  bool solve_from_focal(double focal_px);
   /// Selects the lens model of stage 3; the one of the input if it is not called.
   void set_lens_model(LensModel lens_model) { input_.lens_model = lens_model; }
   /// Splined lenses only: initializes stage 3 with the rotationally symmetric lens OPENCV_FISHEYE.
   /// Keeps the initial lens STEREOGRAPHIC if that fails.
-  void initialize_spline_from_symmetric_lens();
+  void initialize_spline();
   /// Stage 3.
   bool refine_intrinsics();
   /// Repeats stage 3 from the solution of another model if that fits clearly better, and keeps the
   /// better result: views with few tilts have local minima.
-  void restart_if_fit_is_worse(const std::optional<IntrinsicsSolver>& other);
+  void restart_if_worse(const std::optional<IntrinsicsSolver>& other);
   /// Splined lenses only: scales the regularization to the noise of the corners.
-  bool scale_spline_regularization_to_noise();
-  /// Stages 4 and 7: applies correct_corners_for_edge_curvature() to all views and solves again.
-  bool correct_edge_curvature_and_solve_again();
+  bool scale_regularization();
+  /// Stages 4 and 7: applies correct_curvature() to all views and solves again.
+  bool apply_curvature();
   /// Stages 5 (DisplacementForm::constant) and 7 (DisplacementForm::varying): corrects the corners
-  /// for estimate_tag_edge_displacements() and solves again, at most twice, until the terms of the
+  /// for fit_displacements() and solves again, at most twice, until the terms of the
   /// shifts are below 0.002 px.
-  bool correct_edge_displacements_and_solve_again(DisplacementForm form);
+  bool apply_displacements(DisplacementForm form);
   /// Stage 6: estimates the warp of the board if WarpChoice permits it.
   bool solve_board_warp();
   /// Stage 7: weights the corners by their variances (CornerWeights) if standard deviations of some
   /// corners are known.
-  bool reweight_corners_by_variance();
+  bool reweight_corners();
   /// Stage 7 once more, and stage 8. Without a spline, a single solve is enough for both.
-  bool reweight_corners_and_reject_outliers();
+  bool reweight_and_reject();
   /// Stage 9, splined lenses only. Returns true also if the rotation has not converged.
-  bool rotate_camera_frame_to_optical_axis();
+  bool align_to_axis();
 
   /// Returns the current solution.
-  IntrinsicsSolution make_intrinsics_solution() const;
+  IntrinsicsSolution make_solution() const;
 
  private:
   /// A view of the input and a corner of it.
@@ -174,33 +173,32 @@ class IntrinsicsSolver {
   Lens current_lens() const { return Lens(problem_.lens_model, problem_.intrinsics); }
   /// Estimates the pose of every view with a lens. Views without a pose are unused until the next
   /// call.
-  void initialize_board_poses(const Lens& lens);
+  void initialize_poses(const Lens& lens);
   /// Sets up the problem of the views used, at their initial poses.
-  void assemble_board_problem(const Lens& lens);
+  void set_up_problem(const Lens& lens);
   /// Computes the weights of stage 7. Returns false if they do not change.
   bool update_weights();
   /// Solves without outliers.
-  bool reject_corner_outliers();
+  bool reject_outliers();
   /// Returns the index of a corner in the points of the problem; `used` is the index of its view in
   /// used_.
-  std::size_t find_problem_index_of_corner(std::size_t used,
-                                           const BoardLattice::Corner& corner) const;
+  std::size_t compute_problem_index(std::size_t used, const BoardLattice::Corner& corner) const;
   /// Copies pixels and weights of the corners from the input to the problem; outliers are kept.
-  void copy_corners_to_board_problem();
+  void copy_corners();
   /// Returns the RMS residual of each view used, px, in the order of used_; infinity if not finite.
-  std::vector<double> compute_view_residual_rms_px() const;
+  std::vector<double> list_view_rms_px() const;
   /// Returns true if the lens projects all corners of most views. mrcal also solves for points
   /// behind the camera, and takes long.
-  bool can_lens_project_most_views() const;
+  bool can_project_views() const;
   /// Returns the corners of tags with a corner whose residual differs from those of its neighbors.
   /// Skips views in which these would be more than a quarter of the corners.
-  std::set<CornerOfView> find_corners_of_outlier_tags() const;
+  std::set<CornerOfView> list_outlier_tag_corners() const;
   /// If a view fits badly, re-estimates the poses of all views used and drops the worst of the
   /// views that still fit badly. Returns true if the problem has to be solved again.
-  bool reestimate_poses_and_drop_bad_views();
+  bool drop_bad_views();
   /// Reinstates dropped views that fit the current lens: a worse view had distorted the earlier
   /// lens. Returns true if there are any.
-  bool reinstate_dropped_views();
+  bool reinstate_views();
 
   IntrinsicsInput input_;
   /// Mean shift by which the corners of each view of the input were corrected, px.
@@ -224,40 +222,39 @@ IntrinsicsSolver::IntrinsicsSolver(const IntrinsicsInput& input) : input_(input)
   edge_displacements_px_.assign(input.views.size(), 0);
 }
 
-bool IntrinsicsSolver::solve_intrinsics_from_focal_length(double focal_px) {
+bool IntrinsicsSolver::solve_from_focal(double focal_px) {
   constexpr int max_iterations = 4;
   constexpr double convergence = 1e-3;
-  Lens lens = make_stereographic_lens(input_, focal_px);
+  Lens lens = make_initial_lens(input_, focal_px);
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const double before_px = lens.focal_px().x();
-    initialize_board_poses(lens);
+    initialize_poses(lens);
     if (used_.size() < kMinViews) return false;
-    assemble_board_problem(lens);
-    if (!solve_intermediate_board_problem(problem_, {.core = true})) return false;
+    set_up_problem(lens);
+    if (!solve_stage(problem_, {.core = true})) return false;
     lens = this->current_lens();
     if (std::abs(lens.focal_px().x() / before_px - 1) < convergence) break;
   }
   return true;
 }
 
-void IntrinsicsSolver::initialize_spline_from_symmetric_lens() {
+void IntrinsicsSolver::initialize_spline() {
   if (!is_splined_lens_model(input_.lens_model)) return;
   IntrinsicsSolver symmetric = *this;
   symmetric.input_.lens_model = LensModel::fisheye;
   if (!symmetric.refine_intrinsics()) return;  // keeps STEREOGRAPHIC
   symmetric_ = symmetric.problem_.intrinsics;
-  displaced_corners_ = symmetric.find_corners_of_outlier_tags();
+  displaced_corners_ = symmetric.list_outlier_tag_corners();
   const Lens fisheye = symmetric.current_lens();
   for (const std::size_t view : used_) {
-    if (const auto pose = estimate_board_view_pose(input_.views[view], fisheye)) {
+    if (const auto pose = estimate_view_pose(input_.views[view], fisheye)) {
       initial_poses_.poses[view] = pose->camera_from_board;
     }
   }
-  const std::vector<double> core = fit_core_intrinsics_of_splined_lens(
-      fisheye, collect_inlier_corner_pixels(symmetric.problem_));
+  const std::vector<double> core = fit_spline_core(fisheye, list_inlier_pixels(symmetric.problem_));
   // With too few control points, STEREOGRAPHIC with that core is used.
   problem_.intrinsics =
-      fit_splined_lens_to_lens(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
+      fit_splined_lens(fisheye, input_.imager_px, input_.lens_model, core).value_or(core);
   problem_.lens_model = input_.lens_model;
   problem_.intrinsics.resize(num_lens_parameters(input_.lens_model), 0);
   // The axis, and two rays next to it that prevent a rotation about it.
@@ -267,28 +264,28 @@ void IntrinsicsSolver::initialize_spline_from_symmetric_lens() {
     if (const auto ray = fisheye.unproject_pixel(pixel))
       problem_.fixed_rays.push_back({pixel, ray->direction});
   }
-  assemble_board_problem(current_lens());
+  set_up_problem(current_lens());
 }
 
-bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
+bool IntrinsicsSolver::align_to_axis() {
   constexpr int max_iterations = 4;
   constexpr double tolerance_rad = 1e-4;  // 0.006 degrees
   if (symmetric_.empty()) return true;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    const auto pixels = collect_inlier_corner_pixels(problem_);
+    const auto pixels = list_inlier_pixels(problem_);
     BoardProblem symmetric = problem_;
     symmetric.lens_model = LensModel::fisheye;
     symmetric.intrinsics = symmetric_;
     const auto start =
-        fit_rotation_between_lenses(current_lens(), Lens(LensModel::fisheye, symmetric_), pixels);
+        fit_lens_rotation(current_lens(), Lens(LensModel::fisheye, symmetric_), pixels);
     if (!start) return true;
-    rotate_all_board_poses(symmetric.poses, *start);
+    rotate_boards(symmetric.poses, *start);
     if (!solve_board_problem(symmetric,
                              {.core = true, .distortions = true, .warp = solved_parameters_.warp}))
       return true;
     const Lens fisheye(LensModel::fisheye, symmetric.intrinsics);
     symmetric_ = symmetric.intrinsics;
-    const auto new_from_old = fit_rotation_between_lenses(current_lens(), fisheye, pixels);
+    const auto new_from_old = fit_lens_rotation(current_lens(), fisheye, pixels);
     if (!new_from_old) return true;
     const double turned_rad = Eigen::AngleAxisd(*new_from_old).angle();
     if (turned_rad < tolerance_rad) return true;
@@ -296,7 +293,7 @@ bool IntrinsicsSolver::rotate_camera_frame_to_optical_axis() {
       if (const auto seen = current_lens().project_point(new_from_old->transpose() * ray))
         pixel = *seen;
     }
-    rotate_all_board_poses(problem_.poses, *new_from_old);
+    rotate_boards(problem_.poses, *new_from_old);
     if (!solve_board_problem(problem_, solved_parameters_)) return false;
   }
   return true;
@@ -310,30 +307,30 @@ bool IntrinsicsSolver::refine_intrinsics() {
   if (is_splined_lens_model(input_.lens_model)) solved_parameters_.core = false;
   const std::size_t given = problem_.intrinsics.size();
   problem_.intrinsics.resize(num_lens_parameters(input_.lens_model), 0);
-  const auto distortions = list_distortion_names_and_initial_values(input_.lens_model);
+  const auto distortions = list_distortions(input_.lens_model);
   for (std::size_t i = given; i < core + distortions.size(); ++i) {
     problem_.intrinsics[i] = distortions[i - core].start;
   }
   bool convergence = false;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     if (!solve_board_problem(problem_, solved_parameters_)) return false;
-    convergence = !reestimate_poses_and_drop_bad_views();
+    convergence = !drop_bad_views();
     if (convergence) break;
     if (used_.size() < kMinViews) return false;
-    assemble_board_problem(current_lens());
+    set_up_problem(current_lens());
   }
-  if (reinstate_dropped_views()) {
-    assemble_board_problem(current_lens());
+  if (reinstate_views()) {
+    set_up_problem(current_lens());
   } else if (convergence) {
-    return can_lens_project_most_views();
+    return can_project_views();
   }
-  return solve_board_problem(problem_, solved_parameters_) && can_lens_project_most_views();
+  return solve_board_problem(problem_, solved_parameters_) && can_project_views();
 }
 
-void IntrinsicsSolver::restart_if_fit_is_worse(const std::optional<IntrinsicsSolver>& other) {
+void IntrinsicsSolver::restart_if_worse(const std::optional<IntrinsicsSolver>& other) {
   constexpr double max_ratio = 1.5;
-  const double rms_px = make_intrinsics_solution().rms_px;
-  if (!other || rms_px <= max_ratio * other->make_intrinsics_solution().rms_px) return;
+  const double rms_px = make_solution().rms_px;
+  if (!other || rms_px <= max_ratio * other->make_solution().rms_px) return;
   IntrinsicsSolver restarted = *other;
   restarted.set_lens_model(input_.lens_model);
   Camera camera;
@@ -341,22 +338,21 @@ void IntrinsicsSolver::restart_if_fit_is_worse(const std::optional<IntrinsicsSol
   camera.imager_px = input_.imager_px;
   camera.intrinsics = other->problem_.intrinsics;
   try {
-    restarted.problem_.intrinsics =
-        convert_camera_to_lens_model(camera, input_.lens_model).camera.intrinsics;
+    restarted.problem_.intrinsics = convert_lens_model(camera, input_.lens_model).camera.intrinsics;
   } catch (const std::invalid_argument&) {
     return;  // no lens of the model is similar
   }
   const bool is_better = restarted.refine_intrinsics() && restarted.used_.size() >= used_.size() &&
-                         restarted.make_intrinsics_solution().rms_px < rms_px;
+                         restarted.make_solution().rms_px < rms_px;
   if (is_better) *this = std::move(restarted);
 }
 
-bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
+bool IntrinsicsSolver::scale_regularization() {
   constexpr int max_iterations = 3;
   constexpr double min_px = 0.01, convergence = 0.1;
   if (!is_splined_lens_model(problem_.lens_model)) return true;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    const double noise_px = std::clamp(make_intrinsics_solution().rms_px, min_px, 1.0);
+    const double noise_px = std::clamp(make_solution().rms_px, min_px, 1.0);
     if (std::abs(noise_px / problem_.noise_px - 1) < convergence) break;
     problem_.noise_px = noise_px;
     if (!solve_board_problem(problem_, solved_parameters_)) return false;
@@ -364,52 +360,49 @@ bool IntrinsicsSolver::scale_spline_regularization_to_noise() {
   return true;
 }
 
-std::size_t IntrinsicsSolver::find_problem_index_of_corner(
-    std::size_t used, const BoardLattice::Corner& corner) const {
+std::size_t IntrinsicsSolver::compute_problem_index(std::size_t used,
+                                                    const BoardLattice::Corner& corner) const {
   return (used * input_.lattice.num_board_parts() + corner.part) *
-             input_.lattice.num_points_per_part() +
+             input_.lattice.points_per_part() +
          corner.point;
 }
 
-void IntrinsicsSolver::copy_corners_to_board_problem() {
+void IntrinsicsSolver::copy_corners() {
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      Eigen::Vector3d& point = problem_.points[find_problem_index_of_corner(i, corner)];
+      Eigen::Vector3d& point = problem_.points[compute_problem_index(i, corner)];
       point << corner.pixel, std::copysign(corner.weight, point.z());
     }
   }
 }
 
-bool IntrinsicsSolver::correct_edge_curvature_and_solve_again() {
+bool IntrinsicsSolver::apply_curvature() {
   constexpr double tolerance_px = 0.002;
   double max_px = 0;
   const Lens lens = this->current_lens();
-  for (auto& view : input_.views)
-    max_px = std::max(max_px, correct_corners_for_edge_curvature(view, lens));
+  for (auto& view : input_.views) max_px = std::max(max_px, correct_curvature(view, lens));
   if (max_px < tolerance_px) return true;
-  copy_corners_to_board_problem();
-  return solve_intermediate_board_problem(problem_, solved_parameters_);
+  copy_corners();
+  return solve_stage(problem_, solved_parameters_);
 }
 
-bool IntrinsicsSolver::correct_edge_displacements_and_solve_again(DisplacementForm form) {
+bool IntrinsicsSolver::apply_displacements(DisplacementForm form) {
   constexpr int max_iterations = 2;
   constexpr double tolerance_px = 0.002;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     auto views = input_.views;
-    for (auto& view : views)
-      view = input_.lattice.apply_warp_to_board_corners(std::move(view), problem_.warp_m);
-    const auto shifts = estimate_tag_edge_displacements(views, current_lens(), form);
+    for (auto& view : views) view = input_.lattice.apply_warp(std::move(view), problem_.warp_m);
+    const auto shifts = fit_displacements(views, current_lens(), form);
     if (std::all_of(shifts.begin(), shifts.end(), [](const EdgeDisplacement& shift) {
           return shift.coefficients.lpNorm<Eigen::Infinity>() < tolerance_px;
         })) {
       return true;
     }
     for (std::size_t view = 0; view < input_.views.size(); ++view) {
-      edge_displacements_px_[view] +=
-          correct_corners_for_edge_displacement(input_.views[view], shifts[view]);
+      edge_displacements_px_[view] += correct_displacement(input_.views[view], shifts[view]);
     }
-    copy_corners_to_board_problem();
-    if (!solve_intermediate_board_problem(problem_, solved_parameters_)) return false;
+    copy_corners();
+    if (!solve_stage(problem_, solved_parameters_)) return false;
   }
   return true;
 }
@@ -420,10 +413,10 @@ bool IntrinsicsSolver::solve_board_warp() {
   const auto squares = [](const IntrinsicsSolution& solution) {
     return solution.rms_px * solution.rms_px * 2 * solution.corners;
   };
-  const IntrinsicsSolution flat = make_intrinsics_solution();
+  const IntrinsicsSolution flat = make_solution();
   solved_parameters_.warp = true;
-  if (!solve_intermediate_board_problem(problem_, solved_parameters_)) return false;
-  const IntrinsicsSolution with_warp = make_intrinsics_solution();
+  if (!solve_stage(problem_, solved_parameters_)) return false;
+  const IntrinsicsSolution with_warp = make_solution();
   if (input_.warp == WarpChoice::automatic &&
       squares(flat) - squares(with_warp) <= min_reduction * with_warp.rms_px * with_warp.rms_px) {
     problem_ = flat.problem;
@@ -433,11 +426,11 @@ bool IntrinsicsSolver::solve_board_warp() {
 }
 
 bool IntrinsicsSolver::update_weights() {
-  const auto residuals = compute_reprojection_residuals(problem_);
+  const auto residuals = compute_board_residuals(problem_);
   std::vector<CornerError> known, unknown;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (const auto& corner : input_.views[used_[i]]) {
-      const Eigen::Vector2d& residual = residuals[find_problem_index_of_corner(i, corner)];
+      const Eigen::Vector2d& residual = residuals[compute_problem_index(i, corner)];
       if (!residual.allFinite()) continue;
       (corner.sd_px > 0 ? known : unknown).push_back({residual.squaredNorm() / 2, corner.sd_px});
     }
@@ -449,51 +442,48 @@ bool IntrinsicsSolver::update_weights() {
   for (auto& view : input_.views) {
     for (auto& corner : view) corner.weight = weights.corner_weight(corner.sd_px);
   }
-  copy_corners_to_board_problem();
+  copy_corners();
   return true;
 }
 
-bool IntrinsicsSolver::reweight_corners_by_variance() {
-  return !update_weights() || solve_intermediate_board_problem(problem_, solved_parameters_);
+bool IntrinsicsSolver::reweight_corners() {
+  return !update_weights() || solve_stage(problem_, solved_parameters_);
 }
 
-bool IntrinsicsSolver::reweight_corners_and_reject_outliers() {
+bool IntrinsicsSolver::reweight_and_reject() {
   if (is_splined_lens_model(problem_.lens_model))
-    return reweight_corners_by_variance() && scale_spline_regularization_to_noise() &&
-           reject_corner_outliers();
+    return reweight_corners() && scale_regularization() && reject_outliers();
   update_weights();
-  return reject_corner_outliers();
+  return reject_outliers();
 }
 
-bool IntrinsicsSolver::reject_corner_outliers() {
+bool IntrinsicsSolver::reject_outliers() {
   // Without noise, residuals are caused by the regularization and are not outliers.
   constexpr double exact_px = 0.005;
-  if (make_intrinsics_solution().rms_px < exact_px)
-    return solve_board_problem(problem_, solved_parameters_);
+  if (make_solution().rms_px < exact_px) return solve_board_problem(problem_, solved_parameters_);
   SolveOptions without_outliers = solved_parameters_;
   without_outliers.reject_outliers = true;
-  return solve_board_problem(problem_, without_outliers) &&
-         std::isfinite(make_intrinsics_solution().rms_px);
+  return solve_board_problem(problem_, without_outliers) && std::isfinite(make_solution().rms_px);
 }
 
-IntrinsicsSolution IntrinsicsSolver::make_intrinsics_solution() const {
+IntrinsicsSolution IntrinsicsSolver::make_solution() const {
   IntrinsicsSolution result{IntrinsicsStatus::ok, problem_, used_, dropped_, {}, 0, 0, 0};
   result.solved_parameters = solved_parameters_;
   for (const std::size_t view : used_)
     result.edge_displacements_px.push_back(edge_displacements_px_[view]);
-  result.update_lens_fit_statistics();
+  result.update_statistics();
   return result;
 }
 
-void IntrinsicsSolver::initialize_board_poses(const Lens& lens) {
-  initial_poses_ = estimate_initial_board_poses(input_, lens);
+void IntrinsicsSolver::initialize_poses(const Lens& lens) {
+  initial_poses_ = estimate_board_poses(input_, lens);
   used_.clear();
   for (std::size_t i = 0; i < input_.views.size(); ++i) {
     if (std::isfinite(initial_poses_.rms_px[i])) used_.push_back(i);
   }
 }
 
-void IntrinsicsSolver::assemble_board_problem(const Lens& lens) {
+void IntrinsicsSolver::set_up_problem(const Lens& lens) {
   const BoardLattice& lattice = input_.lattice;
   problem_.lens_model = lens.lens_model();
   if (problem_.intrinsics.empty() || lens.lens_model() == LensModel::stereographic) {
@@ -505,29 +495,28 @@ void IntrinsicsSolver::assemble_board_problem(const Lens& lens) {
   problem_.rows = lattice.lattice_rows();
   problem_.spacing_m = lattice.point_spacing_m();
   problem_.poses.clear();
-  problem_.points.assign(used_.size() * lattice.num_board_parts() * lattice.num_points_per_part(),
+  problem_.points.assign(used_.size() * lattice.num_board_parts() * lattice.points_per_part(),
                          {-1, -1, BoardProblem::kUnseen});
   for (std::size_t i = 0; i < used_.size(); ++i) {
     for (std::size_t part = 0; part < lattice.num_board_parts(); ++part) {
-      problem_.poses.push_back(
-          lattice.compute_board_part_pose(initial_poses_.poses[used_[i]], part));
+      problem_.poses.push_back(lattice.compute_part_pose(initial_poses_.poses[used_[i]], part));
     }
     const auto& corners = input_.views[used_[i]];
     for (std::size_t k = 0; k < corners.size(); ++k) {
       const double sign = displaced_corners_.contains({used_[i], k}) ? -1 : 1;
-      problem_.points[find_problem_index_of_corner(i, corners[k])] << corners[k].pixel,
+      problem_.points[compute_problem_index(i, corners[k])] << corners[k].pixel,
           sign * corners[k].weight;
     }
   }
 }
 
-bool IntrinsicsSolver::can_lens_project_most_views() const {
-  return std::isfinite(upper_median(compute_view_residual_rms_px()));
+bool IntrinsicsSolver::can_project_views() const {
+  return std::isfinite(upper_median(list_view_rms_px()));
 }
 
-std::vector<double> IntrinsicsSolver::compute_view_residual_rms_px() const {
-  const auto residuals = compute_reprojection_residuals(problem_);
-  const std::size_t count = input_.lattice.num_board_parts() * input_.lattice.num_points_per_part();
+std::vector<double> IntrinsicsSolver::list_view_rms_px() const {
+  const auto residuals = compute_board_residuals(problem_);
+  const std::size_t count = input_.lattice.num_board_parts() * input_.lattice.points_per_part();
   std::vector<double> rms;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     double squares = 0;
@@ -542,19 +531,19 @@ std::vector<double> IntrinsicsSolver::compute_view_residual_rms_px() const {
   return rms;
 }
 
-std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_corners_of_outlier_tags() const {
+std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::list_outlier_tag_corners() const {
   constexpr std::size_t neighbors = 8;
   constexpr double sigmas = 8, min_px = 0.1, median_of_normal = 0.6745;
   // If OPENCV_FISHEYE does not fit the lens, the residuals of neighbors also differ from each
   // other.
   constexpr double beside_sigmas = 5;
-  const auto residuals = compute_reprojection_residuals(problem_);
+  const auto residuals = compute_board_residuals(problem_);
   std::map<CornerOfView, double> deviations_px;
   std::vector<double> all_px;
   for (std::size_t i = 0; i < used_.size(); ++i) {
     const auto& corners = input_.views[used_[i]];
     const auto residual = [&](std::size_t k) -> const Eigen::Vector2d& {
-      return residuals[find_problem_index_of_corner(i, corners[k])];
+      return residuals[compute_problem_index(i, corners[k])];
     };
     for (std::size_t k = 0; k < corners.size(); ++k) {
       std::vector<std::pair<double, std::size_t>> near;
@@ -587,9 +576,9 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_corners_of_outli
   for (const auto& [outlier, px] : deviations_px) {
     if (px <= limit_px) continue;
     const auto& corners = input_.views[outlier.first];
-    const std::size_t tag = input_.lattice.find_tag_index_of_point(corners[outlier.second].point);
+    const std::size_t tag = input_.lattice.get_tag_of_point(corners[outlier.second].point);
     for (std::size_t k = 0; k < corners.size(); ++k) {
-      if (input_.lattice.find_tag_index_of_point(corners[k].point) == tag)
+      if (input_.lattice.get_tag_of_point(corners[k].point) == tag)
         found.insert({outlier.first, k});
     }
   }
@@ -602,16 +591,16 @@ std::set<IntrinsicsSolver::CornerOfView> IntrinsicsSolver::find_corners_of_outli
   return found;
 }
 
-bool IntrinsicsSolver::reestimate_poses_and_drop_bad_views() {
+bool IntrinsicsSolver::drop_bad_views() {
   constexpr double max_ratio = 0.7;
-  const auto rms = compute_view_residual_rms_px();
+  const auto rms = list_view_rms_px();
   const double limit_px = compute_max_view_rms(rms);
   const double worst_px = *std::max_element(rms.begin(), rms.end());
   if (worst_px <= limit_px) return false;
   const Lens lens = this->current_lens();
   std::vector<std::size_t> kept;
   for (std::size_t i = 0; i < used_.size(); ++i) {
-    const auto pose = estimate_board_view_pose(input_.views[used_[i]], lens);
+    const auto pose = estimate_view_pose(input_.views[used_[i]], lens);
     const bool helps = pose && pose->rms_px < max_ratio * rms[i];
     const bool bad = rms[i] > limit_px && rms[i] > worst_px / 2 && !helps;
     if (bad || !pose) {
@@ -625,12 +614,12 @@ bool IntrinsicsSolver::reestimate_poses_and_drop_bad_views() {
   return true;
 }
 
-bool IntrinsicsSolver::reinstate_dropped_views() {
-  const double limit_px = compute_max_view_rms(compute_view_residual_rms_px());
+bool IntrinsicsSolver::reinstate_views() {
+  const double limit_px = compute_max_view_rms(list_view_rms_px());
   const Lens lens = this->current_lens();
   const std::size_t before = dropped_.size();
   std::erase_if(dropped_, [&](const auto& dropped) {
-    const auto pose = estimate_board_view_pose(input_.views[dropped.view], lens);
+    const auto pose = estimate_view_pose(input_.views[dropped.view], lens);
     if (!pose || pose->rms_px > limit_px) return false;
     initial_poses_.poses[dropped.view] = pose->camera_from_board;
     used_.push_back(dropped.view);
@@ -638,7 +627,7 @@ bool IntrinsicsSolver::reinstate_dropped_views() {
   });
   std::sort(used_.begin(), used_.end());
   for (std::size_t i = 0; i < used_.size() && dropped_.size() < before; ++i) {
-    if (const auto pose = estimate_board_view_pose(input_.views[used_[i]], lens)) {
+    if (const auto pose = estimate_view_pose(input_.views[used_[i]], lens)) {
       initial_poses_.poses[used_[i]] = pose->camera_from_board;
     }
   }
@@ -660,8 +649,7 @@ struct InitialSolutions::Stages {
   const std::optional<IntrinsicsSolver>& solve_initial(std::size_t start) {
     while (initial.size() <= start) {
       IntrinsicsSolver solver(input);
-      const bool is_solved =
-          solver.solve_intrinsics_from_focal_length(rank_focal_lengths()[initial.size()]);
+      const bool is_solved = solver.solve_from_focal(rank_focal_lengths()[initial.size()]);
       initial.push_back(is_solved ? std::optional(std::move(solver)) : std::nullopt);
     }
     return initial[start];
@@ -674,10 +662,10 @@ struct InitialSolutions::Stages {
       std::optional<IntrinsicsSolver> solver = solve_initial(of_model.size());
       if (solver) {
         solver->set_lens_model(lens_model);
-        solver->initialize_spline_from_symmetric_lens();
+        solver->initialize_spline();
         if (!solver->refine_intrinsics()) solver.reset();
         if (solver && lens_model == LensModel::fisheye)
-          solver->restart_if_fit_is_worse(refine(of_model.size(), LensModel::opencv4));
+          solver->restart_if_worse(refine(of_model.size(), LensModel::opencv4));
       }
       of_model.push_back(std::move(solver));
     }
@@ -699,7 +687,7 @@ InitialSolutions::~InitialSolutions() = default;
 
 const IntrinsicsInput& InitialSolutions::input() const { return stages_->input; }
 
-const std::vector<double>& InitialSolutions::initial_focal_lengths_px() const {
+const std::vector<double>& InitialSolutions::focal_lengths_px() const {
   return stages_->rank_focal_lengths();
 }
 
@@ -708,7 +696,7 @@ std::optional<IntrinsicsSolution> InitialSolutions::solve_first_stages(LensModel
   if (input().views.size() < IntrinsicsSolver::kMinViews) return {};
   const auto& solver = stages_->refine(best_start, lens_model);
   if (!solver) return {};
-  return solver->make_intrinsics_solution();
+  return solver->make_solution();
 }
 
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input) {
@@ -719,35 +707,29 @@ IntrinsicsSolution solve_intrinsics(const InitialSolutions& initial, LensModel l
   constexpr std::size_t max_starts = 4;
   const std::size_t num_views = initial.input().views.size();
   if (num_views < IntrinsicsSolver::kMinViews) return make_failure(IntrinsicsStatus::too_few_views);
-  const std::size_t starts = std::min(initial.initial_focal_lengths_px().size(), max_starts);
+  const std::size_t starts = std::min(initial.focal_lengths_px().size(), max_starts);
   for (std::size_t start = 0; start < starts; ++start) {
     const auto& refined = initial.stages_->refine(start, lens_model);
     if (!refined) continue;
     IntrinsicsSolver solver = *refined;
-    if (!solver.scale_spline_regularization_to_noise() ||
-        !solver.correct_edge_curvature_and_solve_again() ||
-        !solver.correct_edge_displacements_and_solve_again(DisplacementForm::constant) ||
-        !solver.solve_board_warp() || !solver.reweight_corners_by_variance() ||
-        !solver.correct_edge_curvature_and_solve_again() ||
-        !solver.correct_edge_displacements_and_solve_again(DisplacementForm::varying) ||
-        !solver.reweight_corners_and_reject_outliers() ||
-        !solver.scale_spline_regularization_to_noise() ||
-        !solver.rotate_camera_frame_to_optical_axis()) {
+    if (!solver.scale_regularization() || !solver.apply_curvature() ||
+        !solver.apply_displacements(DisplacementForm::constant) || !solver.solve_board_warp() ||
+        !solver.reweight_corners() || !solver.apply_curvature() ||
+        !solver.apply_displacements(DisplacementForm::varying) || !solver.reweight_and_reject() ||
+        !solver.scale_regularization() || !solver.align_to_axis()) {
       continue;
     }
-    IntrinsicsSolution solution = solver.make_intrinsics_solution();
-    if (are_all_boards_parallel(solution.problem))
-      return make_failure(IntrinsicsStatus::all_parallel);
+    IntrinsicsSolution solution = solver.make_solution();
+    if (are_boards_parallel(solution.problem)) return make_failure(IntrinsicsStatus::all_parallel);
     if (2 * solution.views.size() > num_views) return solution;
   }
   return make_failure(IntrinsicsStatus::no_solution);
 }
 
-IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution& whole,
-                                                       std::size_t first) {
+IntrinsicsSolution solve_half_of_views(const IntrinsicsSolution& whole, std::size_t first) {
   const BoardProblem& all = whole.problem;
   const std::size_t parts = all.poses.size() / whole.views.size();
-  const std::size_t points = parts * all.num_points_per_board();
+  const std::size_t points = parts * all.points_per_board();
   IntrinsicsSolution half = whole;
   half.views.clear();
   half.edge_displacements_px.clear();
@@ -769,8 +751,8 @@ IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution&
   if (!solve_board_problem(half.problem, half.solved_parameters)) {
     return make_failure(IntrinsicsStatus::no_solution);
   }
-  if (are_all_boards_parallel(half.problem)) return make_failure(IntrinsicsStatus::all_parallel);
-  half.update_lens_fit_statistics();
+  if (are_boards_parallel(half.problem)) return make_failure(IntrinsicsStatus::all_parallel);
+  half.update_statistics();
   return half;
 }
 

@@ -37,7 +37,7 @@ enum class IntrinsicsStatus {
   no_solution,    // no lens of the model fits
 };
 /// Describes a status in one line, with the remedy.
-std::string_view describe_intrinsics_status(IntrinsicsStatus status);
+std::string_view describe_status(IntrinsicsStatus status);
 
 /// Result of solve_intrinsics(): lens, poses and board warp with their fit.
 struct IntrinsicsSolution {
@@ -54,7 +54,7 @@ struct IntrinsicsSolution {
   };
   std::vector<DroppedView> dropped_views;
   /// Mean shift of the tag edges towards the dark in each of `views`, px. The corners are corrected
-  /// for it (estimate_tag_edge_displacements()).
+  /// for it (fit_displacements()).
   std::vector<double> edge_displacements_px;
   /// RMS of the weighted residuals per axis, without outliers: sqrt(sum of squares / (2 corners)),
   /// px.
@@ -64,7 +64,7 @@ struct IntrinsicsSolution {
 
   bool has_succeeded() const { return status == IntrinsicsStatus::ok; }
   /// Computes rms_px, corners and outliers from `problem`.
-  void update_lens_fit_statistics();
+  void update_statistics();
   Lens fitted_lens() const { return Lens(problem.lens_model, problem.intrinsics); }
   /// Estimated parameters: the intrinsics (splined lenses: without the core), and the warp if
   /// selected.
@@ -80,9 +80,9 @@ struct IntrinsicsSolution {
 /// 3. Solves the requested model, regularized as in mrcal, and re-estimates the poses. Drops views
 ///   that fit no pose. Splined lenses: see below.
 /// 4. Corrects the corners of the tags for the edge curvature of this lens
-///   (correct_corners_for_edge_curvature()).
+///   (correct_curvature()).
 /// 5. Corrects the shift of the tag edges, constant over a view
-///   (estimate_tag_edge_displacements()), and solves again, at most twice.
+///   (fit_displacements()), and solves again, at most twice.
 /// 6. Estimates the warp of the board (WarpChoice).
 /// 7. Weights the corners by their variances if the images provide them (CornerWeights). Repeats
 ///   stage 4, then stage 5 with shifts that vary over a view, then the weights.
@@ -90,7 +90,7 @@ struct IntrinsicsSolution {
 /// 9. Splined lenses: aligns the frame to the axis of the lens.
 ///
 /// Stages 3, 8 and 9 call solve_board_problem(). Other solves call the faster
-/// solve_intermediate_board_problem(); stage 8 refines their result.
+/// solve_stage(); stage 8 refines their result.
 ///
 /// Splined lenses start stage 3 from OPENCV_FISHEYE, whose center becomes their center. Their
 /// regularization is scaled to the residual noise instead of 1 px, which would bias the lens by
@@ -108,7 +108,7 @@ struct IntrinsicsSolution {
 /// points.
 ///
 /// Both poses of each view are tried with each lens, to resolve the planar pose ambiguity
-/// (estimate_board_view_pose()). The result depends on the input only, not on threads.
+/// (estimate_view_pose()). The result depends on the input only, not on threads.
 IntrinsicsSolution solve_intrinsics(const IntrinsicsInput& input);
 
 /// Views of a solve, and the results of its first stages. Stages 1 and 2 of solve_intrinsics() do
@@ -124,7 +124,7 @@ class InitialSolutions {
 
   const IntrinsicsInput& input() const;
   /// Returns the focal lengths of rank_initial_focal_lengths(), px, the best one first.
-  const std::vector<double>& initial_focal_lengths_px() const;
+  const std::vector<double>& focal_lengths_px() const;
   /// Estimates a lens of a model by stages 1 to 3, from the best focal length. Returns std::nullopt
   /// if there are fewer than three views or a stage fails.
   std::optional<IntrinsicsSolution> solve_first_stages(LensModel lens_model) const;
@@ -143,11 +143,10 @@ IntrinsicsSolution solve_intrinsics(const InitialSolutions& initial, LensModel l
 /// solution. Estimates lens, poses and warp. Keeps from `whole` the edge shifts, the weights, the
 /// outliers, and whether the warp is estimated.
 /// @pre whole.has_succeeded()
-IntrinsicsSolution solve_intrinsics_from_half_of_views(const IntrinsicsSolution& whole,
-                                                       std::size_t first);
+IntrinsicsSolution solve_half_of_views(const IntrinsicsSolution& whole, std::size_t first);
 
 /// Returns the residuals of the points of a problem, measured minus projected, px, including
 /// outliers. NaN for points that were not seen or cannot be projected.
-std::vector<Eigen::Vector2d> compute_reprojection_residuals(const BoardProblem& problem);
+std::vector<Eigen::Vector2d> compute_board_residuals(const BoardProblem& problem);
 
 }  // namespace vlp

@@ -45,13 +45,13 @@ std::optional<IntrinsicsSolution> fit_model_to_corners(const IntrinsicsSolution&
     camera.imager_px = from.imager_px;
     camera.intrinsics = from.intrinsics;
     try {
-      fit.problem.intrinsics = convert_camera_to_lens_model(camera, model).camera.intrinsics;
+      fit.problem.intrinsics = convert_lens_model(camera, model).camera.intrinsics;
     } catch (const std::invalid_argument&) {
       return {};  // no lens of the model is similar
     }
   }
-  if (!solve_intermediate_board_problem(fit.problem, fit.solved_parameters)) return {};
-  fit.update_lens_fit_statistics();
+  if (!solve_stage(fit.problem, fit.solved_parameters)) return {};
+  fit.update_statistics();
   return fit;
 }
 
@@ -60,7 +60,7 @@ using LogSquares = Eigen::VectorXd;
 
 /// Computes the logarithms for a fit; infinite if a view is not determined.
 LogSquares compute_log_squares(const IntrinsicsSolution& fit) {
-  const std::vector<double> squares_px2 = compute_left_out_mean_squares_px2(fit, kBlocks);
+  const std::vector<double> squares_px2 = compute_left_out_squares_px2(fit, kBlocks);
   LogSquares logs(std::ssize(squares_px2));
   for (std::size_t view = 0; view < squares_px2.size(); ++view)
     logs[static_cast<Eigen::Index>(view)] = std::log(squares_px2[view]);
@@ -77,7 +77,7 @@ double compute_max_mean(const Eigen::VectorXd& values, Eigen::Index blocks, doub
   const double freedom = static_cast<double>(blocks - 1), count = static_cast<double>(views);
   const double variance =
       sums.squaredNorm() * static_cast<double>(blocks) / freedom / count / count;
-  return std::sqrt(compute_squared_student_t_bound(errors, freedom) * variance);
+  return std::sqrt(compute_squared_t_bound(errors, freedom) * variance);
 }
 
 /// Compares the candidates with the best one: sets their excess and its limits.
@@ -107,7 +107,7 @@ void compare_with_best(const std::vector<LogSquares>& logs, LensChoice& choice) 
 double compute_max_corner_angle_rad(const IntrinsicsSolution& solution) {
   const Lens lens = solution.fitted_lens();
   double smallest = 1;
-  for (const Eigen::Vector2d& pixel : collect_inlier_corner_pixels(solution.problem)) {
+  for (const Eigen::Vector2d& pixel : list_inlier_pixels(solution.problem)) {
     if (const auto ray = lens.unproject_pixel(pixel)) {
       smallest = std::min(smallest, ray->direction.normalized().z());
     }
@@ -125,7 +125,7 @@ std::optional<FisheyeFit> fit_fisheye_lens(const InitialSolutions& initial) {
   return FisheyeFit{std::move(solution), max_corner_angle_rad};
 }
 
-bool is_fisheye_model_clearly_worse(const InitialSolutions& initial, LensModel other) {
+bool is_fisheye_worse(const InitialSolutions& initial, LensModel other) {
   constexpr double min_square_ratio = 1.5, max_angle_rad = kRightAngle_rad - 0.05;
   const auto fisheye = initial.solve_first_stages(LensModel::fisheye);
   const auto compared = initial.solve_first_stages(other);
@@ -134,11 +134,11 @@ bool is_fisheye_model_clearly_worse(const InitialSolutions& initial, LensModel o
   return ratio * ratio > min_square_ratio && compute_max_corner_angle_rad(*fisheye) < max_angle_rad;
 }
 
-bool may_be_wide_angle_lens(const InitialSolutions& initial) {
+bool may_be_wide_angle(const InitialSolutions& initial) {
   constexpr double wide_rad = 0.7;
   const IntrinsicsInput& input = initial.input();
   if (input.views.empty()) return false;
-  const Lens lens = make_stereographic_lens(input, initial.initial_focal_lengths_px().front());
+  const Lens lens = make_initial_lens(input, initial.focal_lengths_px().front());
   double farthest_px = 0;
   for (const auto& corners : input.views) {
     for (const auto& corner : corners) {
@@ -150,8 +150,7 @@ bool may_be_wide_angle_lens(const InitialSolutions& initial) {
 
 IntrinsicsSolution solve_opencv8_or_fisheye(const InitialSolutions& initial) {
   std::optional<FisheyeFit> fisheye;
-  if (may_be_wide_angle_lens(initial) &&
-      !is_fisheye_model_clearly_worse(initial, LensModel::opencv8)) {
+  if (may_be_wide_angle(initial) && !is_fisheye_worse(initial, LensModel::opencv8)) {
     fisheye = fit_fisheye_lens(initial);
   }
   if (fisheye && fisheye->max_corner_angle_rad >= kRightAngle_rad)
@@ -194,7 +193,7 @@ std::optional<LensChoice> select_lens_model(const InitialSolutions& initial) {
   return compare_lens_models(reference);
 }
 
-std::string describe_lens_model_choice(const LensChoice& choice) {
+std::string describe_choice(const LensChoice& choice) {
   std::string selected, others;
   for (const LensCandidate& candidate : choice.candidates) {
     std::string figures(lens_model_name(candidate.model));

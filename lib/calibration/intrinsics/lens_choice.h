@@ -18,7 +18,7 @@ namespace vlp {
 struct LensCandidate {
   LensModel model;
   /// Geometric mean, over the views, of the RMS residual per axis of a held-out view, px
-  /// (compute_left_out_mean_squares_px2()). Infinity if no lens of the model fits.
+  /// (compute_left_out_squares_px2()). Infinity if no lens of the model fits.
   double rms_px = std::numeric_limits<double>::infinity();
   /// `rms_px` relative to the smallest one of all candidates, minus 1. The model is rejected if
   /// this exceeds `max_excess`. It may describe the lens up to `max_plausible_excess`.
@@ -62,11 +62,11 @@ std::optional<FisheyeFit> fit_fisheye_lens(const InitialSolutions& initial);
 ///
 /// The corners are then not yet corrected for curvature and displacement of the edges. Both models
 /// have these errors, so that the ratio of their residuals is closer to 1 than after all stages.
-bool is_fisheye_model_clearly_worse(const InitialSolutions& initial, LensModel other);
+bool is_fisheye_worse(const InitialSolutions& initial, LensModel other);
 
 /// Returns true if corners may be more than 40 degrees off the axis. Assumes the focal length with
 /// which the poses of the views fit best. Takes a small fraction of the time of a solve.
-bool may_be_wide_angle_lens(const InitialSolutions& initial);
+bool may_be_wide_angle(const InitialSolutions& initial);
 
 /// Solves OPENCV8, and OPENCV_FISHEYE for wide lenses if it may fit. Returns the solution with the
 /// smaller residuals, that of OPENCV_FISHEYE if corners are 90 degrees off its axis or more.
@@ -76,13 +76,13 @@ IntrinsicsSolution solve_opencv8_or_fisheye(const InitialSolutions& initial);
 ///
 /// Each model is fitted to the corners of `reference`, with its corrections, weights and outliers,
 /// starting from its lens. The views are divided into five blocks of consecutive views. Each view
-/// is evaluated with the lens of the other blocks (compute_left_out_mean_squares_px2()).
+/// is evaluated with the lens of the other blocks (compute_left_out_squares_px2()).
 /// Consecutive views are often alike, and have the same errors and the same blind spots.
 ///
 /// Two models are compared by the mean, over the views, of the logarithm of the ratio of their
 /// squared residuals. The views of a few positions do not dominate this mean. A model is rejected
 /// if its mean exceeds that of the best by more than one standard error over the views, widened
-/// for few views (compute_squared_student_t_bound()). A model with a smaller mean than the selected
+/// for few views (compute_squared_t_bound()). A model with a smaller mean than the selected
 /// one is never rejected. The smallest model that is not rejected is selected: the
 /// one-standard-error rule of Breiman, Friedman, Olshen and Stone, Classification and Regression
 /// Trees, 1984, 3.4.3. With two standard errors, few views select wrong models with a bias that
@@ -101,6 +101,6 @@ std::optional<LensChoice> compare_lens_models(const IntrinsicsSolution& referenc
 std::optional<LensChoice> select_lens_model(const InitialSolutions& initial);
 
 /// Describes the candidates with the figures that were compared, the selected one first.
-std::string describe_lens_model_choice(const LensChoice& choice);
+std::string describe_choice(const LensChoice& choice);
 
 }  // namespace vlp

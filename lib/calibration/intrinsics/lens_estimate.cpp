@@ -31,19 +31,19 @@ struct SplitViews {
   IntrinsicsInput solved, held_out;
 };
 
-SplitViews split_off_held_out_views(const LensViews& input, LensEstimate& result) {
+SplitViews split_views(const LensViews& input, LensEstimate& result) {
   const IntrinsicsInput empty{BoardLattice(input.board),
                               {},
                               input.views.front().imager_px,
                               input.lens_model,
-                              select_board_warp_model(input.board, input.warp)};
+                              select_board_warp(input.board, input.warp)};
   SplitViews split{empty, empty};
   int count = 0;
   for (const BoardView& view : result.views) {
     ++count;
     const bool is_held_out = input.held_out > 0 && count % input.held_out == 0;
     auto& part = is_held_out ? split.held_out : split.solved;
-    part.views.push_back(empty.lattice.list_corners_with_board_positions(view.detection));
+    part.views.push_back(empty.lattice.list_corners(view.detection));
     if (!is_held_out) result.images.push_back(view.image);
   }
   if (input.held_out > 0 && split.held_out.views.empty()) {
@@ -70,11 +70,10 @@ struct BoardExtent {
   std::size_t boards_within = 0, boards = 0;
 };
 
-BoardExtent measure_board_extent(const IntrinsicsSolution& fisheye,
-                                 const Eigen::Vector2d& grid_reach) {
+BoardExtent measure_extent(const IntrinsicsSolution& fisheye, const Eigen::Vector2d& grid_reach) {
   const Lens lens = fisheye.fitted_lens();
   const BoardProblem& problem = fisheye.problem;
-  const std::size_t points = problem.num_points_per_board();
+  const std::size_t points = problem.points_per_board();
   BoardExtent reach;
   for (std::size_t board = 0; board < problem.poses.size(); ++board) {
     Eigen::Vector2d board_reach(0, 0);
@@ -99,28 +98,26 @@ BoardExtent measure_board_extent(const IntrinsicsSolution& fisheye,
 std::string explain_unsuitable_grid(const InitialSolutions& initial, LensModel splined) {
   constexpr double margin = 1.05;
   const std::array<int, 2>& imager_px = initial.input().imager_px;
-  const SplineGrid grid = spline_grid_of_lens_model(splined);
+  const SplineGrid grid = spline_grid_of(splined);
   const IntrinsicsSolution solution = solve_intrinsics(initial, LensModel::fisheye);
   if (!solution.has_succeeded() || solution.rms_px > kMaxFit_px) return "";
   const Eigen::Vector2d grid_reach =
       SplineSurface(grid, std::vector<double>(2 * grid.num_control_points())).spline_half_extent();
-  const BoardExtent reach = measure_board_extent(solution, grid_reach);
+  const BoardExtent reach = measure_extent(solution, grid_reach);
   if (10 * reach.boards_within >= 9 * reach.boards) {
     const Lens lens = solution.fitted_lens();
-    const auto core =
-        fit_core_intrinsics_of_splined_lens(lens, collect_inlier_corner_pixels(solution.problem));
-    return fit_splined_lens_to_lens(lens, imager_px, splined, core)
+    const auto core = fit_spline_core(lens, list_inlier_pixels(solution.problem));
+    return fit_splined_lens(lens, imager_px, splined, core)
                ? ""
-               : describe_too_coarse_spline_grid(lens, imager_px, splined, core);
+               : explain_coarse_grid(lens, imager_px, splined, core);
   }
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
       "the control points of {} extend to {:.0f} degrees off axis horizontally and {:.0f} "
       "vertically, but the board is visible to {:.0f} and {:.0f} degrees: use --lens {}",
-      splined_lens_model_name(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
+      splined_lens_name(grid), angle_deg(grid_reach.x()), angle_deg(grid_reach.y()),
       angle_deg(reach.farthest.x()), angle_deg(reach.farthest.y()),
-      splined_lens_model_name(
-          resize_spline_grid_to_reach(grid, grid_reach.cwiseMax(margin * reach.farthest))));
+      splined_lens_name(resize_spline_grid(grid, grid_reach.cwiseMax(margin * reach.farthest))));
 }
 
 std::string recommend_model(LensModel requested, const IntrinsicsSolution& other) {
@@ -130,8 +127,8 @@ std::string recommend_model(LensModel requested, const IntrinsicsSolution& other
 }
 
 /// Recommends another model that fits if the requested one does not; empty if there is none.
-std::string explain_why_no_lens_fits(const InitialSolutions& initial, LensModel requested,
-                                     const std::optional<FisheyeFit>& fisheye) {
+std::string explain_no_fit(const InitialSolutions& initial, LensModel requested,
+                           const std::optional<FisheyeFit>& fisheye) {
   std::string problem = fisheye ? recommend_model(requested, fisheye->solution) : "";
   double best_px = fisheye ? fisheye->solution.rms_px : kMaxFit_px;
   for (const LensModel other : {LensModel::opencv4, LensModel::opencv8, LensModel::fisheye}) {
@@ -168,7 +165,7 @@ void recommend_fisheye(const FisheyeFit& fisheye, LensEstimate& result) {
 }
 
 /// Warns of a displacement of the edges that a wrong gap between the tags causes, not a camera.
-void warn_about_edge_displacement(const IntrinsicsSolution& solution, LensEstimate& result) {
+void warn_about_edges(const IntrinsicsSolution& solution, LensEstimate& result) {
   constexpr double max_shift_px = 0.4;  // cameras, sharpened and at three times white: 0.25
   const double shift_px = upper_median(solution.edge_displacements_px);
   if (std::abs(shift_px) <= max_shift_px) return;
@@ -179,7 +176,7 @@ void warn_about_edge_displacement(const IntrinsicsSolution& solution, LensEstima
       std::abs(shift_px), shift_px < 0 ? "light" : "dark"));
 }
 
-void warn_about_dropped_views(LensEstimate& result) {
+void warn_about_dropped(LensEstimate& result) {
   const LensModel model = result.solution.problem.lens_model;
   for (const auto& [view, rms_px] : result.solution.dropped_views) {
     if (!std::isfinite(rms_px) && is_splined_lens_model(model)) {
@@ -196,10 +193,10 @@ void warn_about_dropped_views(LensEstimate& result) {
   }
 }
 
-void warn_about_inconsistent_views(LensEstimate& result) {
-  const InconsistentViews found = find_views_inconsistent_with_lens(result.solution);
+void warn_about_views(LensEstimate& result) {
+  const InconsistentViews found = test_view_consistency(result.solution);
   if (found.views.empty()) return;
-  result.inconsistent_views = describe_inconsistent_views(found, result.images);
+  result.inconsistent_views = describe_bad_views(found, result.images);
   result.warnings.push_back(result.inconsistent_views);
 }
 
@@ -225,8 +222,8 @@ std::string explain_why_lens_not_found(const InitialSolutions& initial, LensMode
                                        IntrinsicsStatus status) {
   std::string problem;
   if (status == IntrinsicsStatus::no_solution)
-    problem = explain_why_no_lens_fits(initial, requested, fisheye);
-  return problem.empty() ? std::string(describe_intrinsics_status(status)) : problem;
+    problem = explain_no_fit(initial, requested, fisheye);
+  return problem.empty() ? std::string(describe_status(status)) : problem;
 }
 
 /// Returns the fits of the other models that may describe the lens. Sets are_models_compared.
@@ -235,8 +232,7 @@ std::vector<IntrinsicsSolution> fit_other_models(LensEstimate& result) {
   if (is_splined_lens_model(solution.problem.lens_model)) return {};
   const auto comparison = compare_lens_models(solution);
   result.are_models_compared = comparison.has_value();
-  return comparison ? list_fits_of_possible_models(solution, *comparison)
-                    : std::vector<IntrinsicsSolution>();
+  return comparison ? list_possible_fits(solution, *comparison) : std::vector<IntrinsicsSolution>();
 }
 
 /// Returns the region in which the lens is calibrated and each of the other models has rays.
@@ -246,8 +242,8 @@ ImageRegion compute_region(const IntrinsicsSolution& solution,
   other_lenses.reserve(others.size());
   for (const IntrinsicsSolution& other : others) other_lenses.push_back(other.fitted_lens());
   const auto compute = [&](const std::vector<Lens>& lenses) {
-    return compute_valid_lens_region(collect_inlier_corner_pixels(solution.problem),
-                                     solution.problem.imager_px, solution.fitted_lens(), lenses);
+    return make_valid_region(list_inlier_pixels(solution.problem), solution.problem.imager_px,
+                             solution.fitted_lens(), lenses);
   };
   // Without a region no fix would be checked.
   const ImageRegion region = compute(other_lenses);
@@ -257,8 +253,8 @@ ImageRegion compute_region(const IntrinsicsSolution& solution,
 /// Adds the uncertainty from the choice of the lens model to the report.
 void add_model_uncertainty(const std::vector<IntrinsicsSolution>& others, LensEstimate& result) {
   CalibrationReport& report = result.report;
-  result.model_uncertainty = compute_model_uncertainty(result.solution, others, report.region,
-                                                       report.uncertainty_worst_px);
+  result.model_uncertainty =
+      combine_model_fits(result.solution, others, report.region, report.uncertainty_worst_px);
   if (!result.model_uncertainty) return;
   const ModelUncertainty& model = *result.model_uncertainty;
   report.uncertainty_mean_px = std::hypot(report.uncertainty_mean_px, model.mean_px);
@@ -269,7 +265,7 @@ void add_model_uncertainty(const std::vector<IntrinsicsSolution>& others, LensEs
 std::optional<AspectErrorEffect> add_print_uncertainty(double print_sd, LensEstimate& result) {
   if (print_sd == 0) return {};
   CalibrationReport& report = result.report;
-  auto print = compute_board_aspect_error_effect_on_lens(result.solution, print_sd, report.region);
+  auto print = estimate_aspect_effect(result.solution, print_sd, report.region);
   if (print) {
     result.print_px = print->rms_px;
     report.uncertainty_mean_px = std::hypot(report.uncertainty_mean_px, print->mean_in_region_px);
@@ -286,22 +282,22 @@ std::optional<AspectErrorEffect> add_print_uncertainty(double print_sd, LensEsti
 /// Adds the uncertainty of a solution. `print_sd` is Board::print_sd.
 void add_uncertainty(const SplitViews& views, double print_sd, LensEstimate& result) {
   const IntrinsicsSolution& solution = result.solution;
-  const auto uncertainties = ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(
-      solution, views.solved.lattice);
+  const auto uncertainties =
+      ProjectionUncertainty::compare_corners_and_tags(solution, views.solved.lattice);
   const std::vector<IntrinsicsSolution> others = fit_other_models(result);
-  result.report = compute_lens_calibration_report(solution, views.solved, uncertainties,
-                                                  compute_region(solution, others));
-  result.coverage = compute_board_view_coverage(solution, views.solved);
-  result.held_out = evaluate_lens_on_held_out_views(solution, views.held_out);
+  result.report =
+      make_lens_report(solution, views.solved, uncertainties, compute_region(solution, others));
+  result.coverage = measure_view_coverage(solution, views.solved);
+  result.held_out = fit_held_out_views(solution, views.held_out);
   result.lattice = views.solved.lattice;
-  result.sharpness = measure_lens_sharpness(result.views, views.solved.imager_px);
+  result.sharpness = measure_sharpness(result.views, views.solved.imager_px);
   add_model_uncertainty(others, result);
   const auto print = add_print_uncertainty(print_sd, result);
   // The covariance of hundreds of control points would fill the file, without use for fixes.
   if (is_splined_lens_model(solution.problem.lens_model)) return;
   const ProjectionUncertainty& uncertainty = uncertainties.by_tags;
   MatrixX covariance = uncertainty.intrinsics_covariance();
-  const Eigen::VectorXd& bias = uncertainty.intrinsics_regularization_bias();
+  const Eigen::VectorXd& bias = uncertainty.regularization_bias();
   covariance += bias * bias.transpose();
   if (result.model_uncertainty) covariance += result.model_uncertainty->intrinsics_covariance;
   if (print) covariance += print->intrinsics * print->intrinsics.transpose();
@@ -310,7 +306,7 @@ void add_uncertainty(const SplitViews& views, double print_sd, LensEstimate& res
 
 }  // namespace
 
-WarpChoice select_board_warp_model(const Board& board, WarpChoice warp) {
+WarpChoice select_board_warp(const Board& board, WarpChoice warp) {
   if (board.kind != BoardKind::chessboard || board.cols != board.rows) return warp;
   if (warp == WarpChoice::on) {
     throw std::invalid_argument(
@@ -324,13 +320,13 @@ LensEstimate estimate_lens(LensViews input) {
   LensEstimate result;
   result.views = std::move(input.views);
   input.views = {result.views.front()};
-  result.gamma = estimate_and_correct_tone_curve(result.views, input.board);
+  result.gamma = correct_tone_curve(result.views, input.board);
   const BoardCheck layout = check_board_layout(input.board, result.views, {});
   if (!layout.problem.empty()) {
     fail(result, LensStatus::wrong_board, layout.problem);
     return result;
   }
-  SplitViews views = split_off_held_out_views(input, result);
+  SplitViews views = split_views(input, result);
   const InitialSolutions initial(views.solved);
   if (input.choose_lens_model && !select_lens_model_for_views(initial, views, result))
     return result;
@@ -343,8 +339,8 @@ LensEstimate estimate_lens(LensViews input) {
     }
   }
   std::optional<FisheyeFit> fisheye;
-  if (!result.choice && is_opencv_model(model) && may_be_wide_angle_lens(initial)) {
-    if (!is_fisheye_model_clearly_worse(initial, model)) fisheye = fit_fisheye_lens(initial);
+  if (!result.choice && is_opencv_model(model) && may_be_wide_angle(initial)) {
+    if (!is_fisheye_worse(initial, model)) fisheye = fit_fisheye_lens(initial);
     if (fisheye && fisheye->max_corner_angle_rad >= kRightAngle_rad) {
       fail_undetermined(
           result, views,
@@ -364,7 +360,7 @@ LensEstimate estimate_lens(LensViews input) {
     }
     return result;
   }
-  warn_about_dropped_views(result);
+  warn_about_dropped(result);
   const BoardCheck exact =
       check_board_layout(input.board, result.views, result.solution.fitted_lens(),
                          upper_median(result.solution.edge_displacements_px));
@@ -372,8 +368,8 @@ LensEstimate estimate_lens(LensViews input) {
     fail(result, LensStatus::wrong_board, exact.problem);
     return result;
   }
-  warn_about_inconsistent_views(result);
-  warn_about_edge_displacement(result.solution, result);
+  warn_about_views(result);
+  warn_about_edges(result.solution, result);
   add_uncertainty(views, input.board.print_sd, result);
   if (fisheye) recommend_fisheye(*fisheye, result);
   return result;

@@ -19,7 +19,7 @@ namespace vlp {
 /// Views of a board from which a lens is estimated.
 struct LensViews {
   /// Detections of the board, one per image, in different poses; at least one. Each has enough
-  /// corners to determine a pose (BoardLattice::are_corners_sufficient_for_pose()).
+  /// corners to determine a pose (BoardLattice::can_determine_pose()).
   std::vector<BoardView> views;
   Board board;
   LensModel lens_model = LensModel::opencv8;
@@ -63,7 +63,7 @@ struct LensEstimate {
   /// near a right angle off the axis.
   std::optional<LensModel> better_model = {};
   /// Change of projections by one standard deviation of the board's print
-  /// (compute_board_aspect_error_effect_on_lens()), RMS over the image, px; std::nullopt if
+  /// (estimate_aspect_effect()), RMS over the image, px; std::nullopt if
   /// Board::print_sd is 0 or the solve fails.
   std::optional<double> print_px = {};
   /// Lattice of the corners in `solution`. Covariance of the intrinsics including the bias of the
@@ -77,7 +77,7 @@ struct LensEstimate {
   std::vector<BoardView> views = {};
   /// Images of the views in the solve, in the order of IntrinsicsSolution.
   std::vector<std::string> images = {};
-  /// Describes views that do not fit the lens of the others (find_views_inconsistent_with_lens());
+  /// Describes views that do not fit the lens of the others (test_view_consistency());
   /// empty if all fit. Also one of the warnings.
   std::string inconsistent_views = {};
   std::vector<std::string> warnings = {}, details = {};
@@ -88,12 +88,12 @@ struct LensEstimate {
 /// Returns `warp`, or WarpChoice::off for a square chessboard. Such a board looks the same after a
 /// quarter turn, so that the direction of its warp cannot be determined.
 /// @throws std::invalid_argument if the warp of such a board is requested
-WarpChoice select_board_warp_model(const Board& board, WarpChoice warp);
+WarpChoice select_board_warp(const Board& board, WarpChoice warp);
 
 /// Estimates a lens from views of a board in these stages: tone curve of the camera
-/// (estimate_and_correct_tone_curve()), layout of the board (check_board_layout()), lens model,
+/// (correct_tone_curve()), layout of the board (check_board_layout()), lens model,
 /// solve (solve_intrinsics()), board again with the lens, uncertainty
-/// (compute_lens_calibration_report(), compute_model_uncertainty()).
+/// (make_lens_report(), combine_model_fits()).
 /// @throws std::invalid_argument as BoardLattice
 LensEstimate estimate_lens(LensViews input);
 

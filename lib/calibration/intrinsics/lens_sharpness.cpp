@@ -37,10 +37,8 @@ class ViewValues {
            const Statistic& statistic) {
     std::vector<std::vector<double>> values_by_part(parts_.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
-      const int col =
-          ImageCoverage::image_cell_index_along_axis(at_px[i].x(), imager_px_[0], cols_);
-      const int row =
-          ImageCoverage::image_cell_index_along_axis(at_px[i].y(), imager_px_[1], rows_);
+      const int col = ImageCoverage::cell_index(at_px[i].x(), imager_px_[0], cols_);
+      const int row = ImageCoverage::cell_index(at_px[i].y(), imager_px_[1], rows_);
       values_by_part[static_cast<std::size_t>(row * cols_ + col)].push_back(values[i]);
     }
     for (std::size_t i = 0; i < parts_.size(); ++i) {
@@ -94,7 +92,7 @@ std::vector<double> compute_relative_lights(const std::vector<MeasuredEdge>& edg
   }
   const EdgeField field(edge_values, EdgeField::Terms::position);
   for (const auto& [middle_px, along, step] : edges) {
-    lights.push_back(step.bright / field.evaluate_field_at_edge(middle_px, along));
+    lights.push_back(step.bright / field.evaluate_at_edge(middle_px, along));
   }
   return lights;
 }
@@ -156,7 +154,7 @@ double compute_asymmetry(const Map& mtf50, double mean, const std::array<int, 2>
 
 /// Returns the median over pairs of opposite parts of the mean of the pair. A linear change over
 /// the image does not affect it. NaN without a pair, as in a corner.
-double predict_from_opposite_neighbors(const Map& map, int col, int row) {
+double predict_from_neighbors(const Map& map, int col, int row) {
   const int reach = map.cols / 6;  // a sixth of the image is larger than a speck
   const auto value = [&](int c, int r) {
     const bool inside = c >= 0 && r >= 0 && c < map.cols && r < map.rows;
@@ -180,11 +178,11 @@ struct LocalLoss {
   Eigen::Vector2d at_px = Eigen::Vector2d::Zero();
 };
 
-LocalLoss find_local_loss(const Map& map, const std::array<int, 2>& imager_px) {
+LocalLoss measure_local_loss(const Map& map, const std::array<int, 2>& imager_px) {
   LocalLoss largest;
   for (int row = 0; row < map.rows; ++row) {
     for (int col = 0; col < map.cols; ++col) {
-      const double loss = 1 - map.at(col, row) / predict_from_opposite_neighbors(map, col, row);
+      const double loss = 1 - map.at(col, row) / predict_from_neighbors(map, col, row);
       if (!std::isfinite(loss) || loss <= largest.fraction) continue;  // not if that is NaN
       largest = {loss, compute_cell_center(map, col, row, imager_px)};
     }
@@ -193,7 +191,7 @@ LocalLoss find_local_loss(const Map& map, const std::array<int, 2>& imager_px) {
 }
 
 /// Computes the Michelson contrast (white - black) / (white + black).
-Map compute_contrast_to_neighbors(Map black_to_white) {
+Map divide_by_neighbors(Map black_to_white) {
   for (double& ratio : black_to_white.values) ratio = (1 - ratio) / (1 + ratio);
   return black_to_white;
 }
@@ -221,7 +219,7 @@ void fill_sharpness_maps(std::span<const BoardView> views, const std::array<int,
   }
   blurs.summarize(
       kMinViewsOfQuartile,
-      [](const auto& values) { return compute_mtf50_of_gaussian_blur(lower_quartile(values)); },
+      [](const auto& values) { return compute_mtf50_of_blur(lower_quartile(values)); },
       result.mtf50);
   ratios.summarize(kMinViews, compute_median, result.black_to_white);
   lights.summarize(kMinViews, compute_median, result.light);
@@ -229,7 +227,7 @@ void fill_sharpness_maps(std::span<const BoardView> views, const std::array<int,
 
 }  // namespace
 
-double compute_mtf50_of_gaussian_blur(double sigma_px) {
+double compute_mtf50_of_blur(double sigma_px) {
   return std::sqrt(std::numbers::ln2 / 2) / (std::numbers::pi * sigma_px);
 }
 
@@ -238,11 +236,11 @@ std::optional<double> compute_median_edge_mtf50(const BoardDetection& seen) {
   blurs_px.reserve(4 * seen.tags.size());
   for (const MeasuredEdge& edge : collect_edges(seen)) blurs_px.push_back(edge.step.blur_px);
   if (blurs_px.empty()) return std::nullopt;
-  return compute_mtf50_of_gaussian_blur(upper_median(std::move(blurs_px)));
+  return compute_mtf50_of_blur(upper_median(std::move(blurs_px)));
 }
 
-std::optional<LensSharpness> measure_lens_sharpness(std::span<const BoardView> views,
-                                                    const std::array<int, 2>& imager_px) {
+std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
+                                               const std::array<int, 2>& imager_px) {
   LensSharpness result;
   fill_sharpness_maps(views, imager_px, result);
   const std::vector<double> known = collect_known_values(result.mtf50);
@@ -251,10 +249,10 @@ std::optional<LensSharpness> measure_lens_sharpness(std::span<const BoardView> v
   result.worst_ratio = *std::min_element(known.begin(), known.end()) / result.mean_mtf50;
   result.asymmetry = compute_asymmetry(result.mtf50, result.mean_mtf50, imager_px);
   result.black_level = upper_median(collect_known_values(result.black_to_white));
-  const Map contrasts = compute_contrast_to_neighbors(result.black_to_white);
-  result.local_loss = std::max(find_local_loss(result.mtf50, imager_px).fraction,
-                               find_local_loss(contrasts, imager_px).fraction);
-  const LocalLoss shadow = find_local_loss(result.light, imager_px);
+  const Map contrasts = divide_by_neighbors(result.black_to_white);
+  result.local_loss = std::max(measure_local_loss(result.mtf50, imager_px).fraction,
+                               measure_local_loss(contrasts, imager_px).fraction);
+  const LocalLoss shadow = measure_local_loss(result.light, imager_px);
   result.local_shadow = shadow.fraction;
   result.local_shadow_px = shadow.at_px;
   return result;

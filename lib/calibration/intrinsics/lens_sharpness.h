@@ -18,7 +18,7 @@ namespace vlp {
 /// cycles per pixel:
 ///   exp(-2 (pi sigma f)^2) = 0.5,     f = sqrt(ln 2 / 2) / (pi sigma) = 0.1874 / sigma.
 /// `sigma_px` is positive. It includes the pixel's own aperture, about 0.29 px.
-double compute_mtf50_of_gaussian_blur(double sigma_px);
+double compute_mtf50_of_blur(double sigma_px);
 
 /// Computes the sharpness of one view, in cycles per pixel: the MTF50 of the median blur of its tag
 /// edges. The median is the upper one. Returns std::nullopt if the blur of no edge is known.
@@ -69,10 +69,10 @@ struct LensSharpness {
 };
 
 /// Measures sharpness and contrast from views of a board of AprilTags, with corners corrected for
-/// the tone curve (estimate_and_correct_tone_curve()). Returns std::nullopt if fewer than half of
+/// the tone curve (correct_tone_curve()). Returns std::nullopt if fewer than half of
 /// the parts of the image are known, from at least five views each. This is always so for boards
 /// with corner squares and for boards of squares.
-std::optional<LensSharpness> measure_lens_sharpness(std::span<const BoardView> views,
-                                                    const std::array<int, 2>& imager_px);
+std::optional<LensSharpness> measure_sharpness(std::span<const BoardView> views,
+                                               const std::array<int, 2>& imager_px);
 
 }  // namespace vlp

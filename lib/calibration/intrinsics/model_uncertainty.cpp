@@ -35,7 +35,7 @@ struct ModelDifference {
 std::optional<ModelDifference> compute_difference(const Lens& lens, const Lens& other,
                                                   const std::vector<Eigen::Vector2d>& pixels) {
   constexpr double min_pivot = 1e-5;  // combinations that displace hardly any pixel are left out
-  const auto other_from_lens = fit_rotation_between_lenses(lens, other, pixels);
+  const auto other_from_lens = fit_lens_rotation(lens, other, pixels);
   if (!other_from_lens) return {};
   const auto count = static_cast<Eigen::Index>(num_lens_parameters(lens.lens_model()));
   const auto rows = std::ssize(pixels);
@@ -49,8 +49,7 @@ std::optional<ModelDifference> compute_difference(const Lens& lens, const Lens& 
     const Eigen::Vector3d from = ray->direction.normalized(),
                           to = other_ray->direction.normalized(),
                           change = *other_from_lens * from - to;
-    const auto at = lens.project_point_with_jacobians(from),
-               other_at = other.project_point_with_jacobians(to);
+    const auto at = lens.project_with_jacobians(from), other_at = other.project_with_jacobians(to);
     if (!at || !other_at) continue;
     const Eigen::Vector2d displacement_px = other_at->d_pixel_d_point * change;
     const Eigen::Vector2d reverse_px = at->d_pixel_d_point * other_from_lens->transpose() * change;
@@ -95,8 +94,8 @@ Eigen::VectorXd compute_weights(const std::vector<ModelDifference>& differences)
 
 }  // namespace
 
-std::vector<IntrinsicsSolution> list_fits_of_possible_models(const IntrinsicsSolution& solution,
-                                                             const LensChoice& comparison) {
+std::vector<IntrinsicsSolution> list_possible_fits(const IntrinsicsSolution& solution,
+                                                   const LensChoice& comparison) {
   const LensModel model = solution.problem.lens_model;
   const auto own = std::ranges::find(comparison.candidates, model, &LensCandidate::model);
   const double own_excess = own == comparison.candidates.end() ? 0 : own->excess;
@@ -108,21 +107,20 @@ std::vector<IntrinsicsSolution> list_fits_of_possible_models(const IntrinsicsSol
   return fits;
 }
 
-std::optional<ModelUncertainty> compute_model_uncertainty(
-    const IntrinsicsSolution& solution, std::span<const IntrinsicsSolution> others,
-    const ImageRegion& region, double noise_px) {
+std::optional<ModelUncertainty> combine_model_fits(const IntrinsicsSolution& solution,
+                                                   std::span<const IntrinsicsSolution> others,
+                                                   const ImageRegion& region, double noise_px) {
   const Lens lens = solution.fitted_lens();
   const std::array<int, 2>& imager_px = solution.problem.imager_px;
-  std::vector<Eigen::Vector2d> pixels = make_regular_pixel_grid(imager_px);
+  std::vector<Eigen::Vector2d> pixels = make_pixel_grid(imager_px);
   std::erase_if(pixels, [&](const auto& pixel) { return !polygon_contains(region, pixel); });
   std::vector<ModelDifference> differences;
   for (const IntrinsicsSolution& fit : others) {
     auto difference = compute_difference(lens, fit.fitted_lens(), pixels);
     if (!difference || difference->worst_px <= noise_px) continue;
-    difference->noise_px =
-        std::max(noise_px, estimate_expected_max_projection_difference_px(
-                               fit.fitted_lens(), imager_px,
-                               estimate_intrinsics_covariance_by_jackknife(fit), region));
+    difference->noise_px = std::max(
+        noise_px,
+        predict_max_difference_px(fit.fitted_lens(), imager_px, jackknife_covariance(fit), region));
     if (difference->excess_px2() > 0) differences.push_back(std::move(*difference));
   }
   if (differences.empty()) return {};

@@ -13,7 +13,7 @@
 namespace vlp {
 
 /// Part of the uncertainty of a lens that comes from the choice of its model
-/// (compute_model_uncertainty()).
+/// (combine_model_fits()).
 struct ModelUncertainty {
   /// Model with the largest D_m^2 - s_m^2.
   LensModel model;
@@ -29,8 +29,8 @@ struct ModelUncertainty {
 /// cross-validation does not reject. If it rejects the model of the lens, all models that fit
 /// better count, too.
 /// @param comparison  compare_lens_models() of the solution
-std::vector<IntrinsicsSolution> list_fits_of_possible_models(const IntrinsicsSolution& solution,
-                                                             const LensChoice& comparison);
+std::vector<IntrinsicsSolution> list_possible_fits(const IntrinsicsSolution& solution,
+                                                   const LensChoice& comparison);
 
 /// Computes the uncertainty of a lens from the choice of its model: its differences to the fits of
 /// the other models. With the solution c, another model m, and pixels v of the region,
@@ -55,12 +55,12 @@ std::vector<IntrinsicsSolution> list_fits_of_possible_models(const IntrinsicsSol
 /// All models that are not rejected count alike. Weights exp(elpd) would take millions of corners
 /// with common errors for independent and prefer one model for a hundredth of the residual.
 ///
-/// @param others    list_fits_of_possible_models()
+/// @param others    list_possible_fits()
 /// @param region    CalibrationReport::region, where each of these lenses has rays
 /// @param noise_px  CalibrationReport::uncertainty_worst_px
 /// @return std::nullopt if noise explains all differences
-std::optional<ModelUncertainty> compute_model_uncertainty(
-    const IntrinsicsSolution& solution, std::span<const IntrinsicsSolution> others,
-    const ImageRegion& region, double noise_px);
+std::optional<ModelUncertainty> combine_model_fits(const IntrinsicsSolution& solution,
+                                                   std::span<const IntrinsicsSolution> others,
+                                                   const ImageRegion& region, double noise_px);
 
 }  // namespace vlp

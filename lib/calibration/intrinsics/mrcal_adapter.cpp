@@ -77,7 +77,7 @@ struct Arguments {
 int bytes(Eigen::Index doubles) { return static_cast<int>(doubles) * int(sizeof(double)); }
 
 /// Returns the points with weights for which the noise of the corners is one pixel.
-std::vector<Eigen::Vector3d> make_weighted_points(const BoardProblem& problem) {
+std::vector<Eigen::Vector3d> weight_points(const BoardProblem& problem) {
   auto points = problem.points;
   for (Eigen::Vector3d& point : points) {
     if (point.z() != BoardProblem::kUnseen) point.z() *= 1 / problem.noise_px;
@@ -103,7 +103,7 @@ void unpack_mrcal_state(Unpack* function, double* state, const Arguments& args) 
 /// not grant that, or no thread, the messages of mrcal appear. Calls are sequential, because mrcal
 /// does not document concurrent use.
 template <typename Work>
-void with_suppressed_output(const Work& work) {
+void run_silently(const Work& work) {
   static std::mutex mrcal_mutex;
   const std::lock_guard lock(mrcal_mutex);
   const auto silent_work = [&] {
@@ -126,9 +126,9 @@ bool solve_with_mrcal(BoardProblem& problem, const SolveOptions& solve_options) 
   Arguments args(problem, solve_options, problem.fixed_rays);
   if (args.measurements < args.states) return false;
   Eigen::VectorXd state(args.states), residuals(args.measurements);
-  auto points = make_weighted_points(problem);
+  auto points = weight_points(problem);
   mrcal_stats_t stats{};
-  with_suppressed_output([&] {
+  run_silently([&] {
     stats = mrcal_optimize(
         state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()),
         problem.intrinsics.data(), nullptr, reinterpret_cast<mrcal_pose_t*>(problem.poses.data()),
@@ -155,7 +155,7 @@ Linearization linearize_with_mrcal(const BoardProblem& problem, const SolveOptio
   std::vector<int> column_pointers(static_cast<std::size_t>(args.measurements) + 1);
   std::vector<int> rows(static_cast<std::size_t>(entries));
   std::vector<double> values(static_cast<std::size_t>(entries));
-  const auto points = make_weighted_points(problem);
+  const auto points = weight_points(problem);
   cholmod_sparse jacobian{};
   jacobian.nrow = static_cast<std::size_t>(args.states);
   jacobian.ncol = static_cast<std::size_t>(args.measurements);
@@ -169,7 +169,7 @@ Linearization linearize_with_mrcal(const BoardProblem& problem, const SolveOptio
   jacobian.sorted = 1;
   jacobian.packed = 1;
   bool ok = false;
-  with_suppressed_output([&] {
+  run_silently([&] {
     ok = mrcal_optimizer_callback(
         state.data(), bytes(state.size()), residuals.data(), bytes(residuals.size()), &jacobian,
         problem.intrinsics.data(), nullptr,

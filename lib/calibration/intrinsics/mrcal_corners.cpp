@@ -53,8 +53,7 @@ class CornerTable {
       from = end + 1;
     }
     if (rows.empty()) throw InputError(file, "contains no corner");
-    if (are_too_many_corners_outside_image(num_outside_, num_seen_))
-      throw InputError(*first_outside_);
+    if (are_too_many_outside(num_outside_, num_seen_)) throw InputError(*first_outside_);
   }
 
   InputError error(std::size_t line, const std::string& problem) const {
@@ -83,7 +82,7 @@ class CornerTable {
     if (words.size() == 4) row.weight = parse_weight(line, fourth);
     if (x && y && *x >= 0 && *y >= 0 && row.weight > 0) {
       row.pixel = {*x, *y};
-      const std::string outside = describe_corner_outside_image(*row.pixel, imager_px_);
+      const std::string outside = describe_outside(*row.pixel, imager_px_);
       ++num_seen_;
       if (!outside.empty() && num_outside_++ == 0) first_outside_ = error(line, outside);
     }
@@ -96,8 +95,8 @@ class CornerTable {
     double value = 0;
     const auto [end, problem] = std::from_chars(word.data(), word.data() + word.size(), value);
     if (problem != std::errc() || end != word.data() + word.size() || !std::isfinite(value)) {
-      throw error(line, quote_text_for_message(truncate_text(word, 40)) +
-                            " should be a finite number, or -");
+      throw error(line,
+                  quote_for_message(truncate_text(word, 40)) + " should be a finite number, or -");
     }
     return value;
   }
@@ -126,7 +125,7 @@ class CornerTable {
 /// Describes the numbers of corners of a board, for messages.
 std::string describe_size(const Board& board, const BoardLattice& lattice) {
   return fmt::format("a board of {} x {} {} has {} x {} corners", board.cols, board.rows,
-                     board.has_chessboard_squares() ? "squares" : "tags", lattice.lattice_cols(),
+                     board.has_squares() ? "squares" : "tags", lattice.lattice_cols(),
                      lattice.lattice_rows());
 }
 
@@ -134,7 +133,7 @@ std::string describe_wrong_count(const Board& board, const BoardLattice& lattice
                                  std::size_t rows) {
   std::string words = fmt::format("{} rows, but {}", rows, describe_size(board, lattice));
   if (lattice.num_board_parts() > 1) words += " of each kind";
-  if (board.has_chessboard_squares() && rows == static_cast<std::size_t>(board.cols * board.rows)) {
+  if (board.has_squares() && rows == static_cast<std::size_t>(board.cols * board.rows)) {
     words += fmt::format(
         "; cols and rows of board.yaml count squares, not the corners between them: cols {}, rows "
         "{}",
@@ -153,8 +152,8 @@ struct PartOfImage {
   std::size_t part;
 };
 
-PartOfImage parse_part_of_image_name(const BoardLattice& lattice, const CornerTable& table,
-                                     std::size_t line, std::string_view name) {
+PartOfImage parse_image_part(const BoardLattice& lattice, const CornerTable& table,
+                             std::size_t line, std::string_view name) {
   PartOfImage found{std::string(name), 0};
   if (lattice.num_board_parts() == 1) return found;
   const auto ending = name.rfind("-corner");
@@ -172,7 +171,7 @@ PartOfImage parse_part_of_image_name(const BoardLattice& lattice, const CornerTa
 void check_row_length(const Board& board, const BoardLattice& lattice, const CornerTable& table,
                       const std::vector<LatticePixels>& images, std::size_t first_line) {
   const auto stated = static_cast<std::size_t>(lattice.lattice_cols());
-  const std::size_t found_cols = estimate_points_per_lattice_row(images, stated);
+  const std::size_t found_cols = estimate_points_per_row(images, stated);
   if (found_cols == stated) return;
   const bool is_swapped = found_cols == static_cast<std::size_t>(lattice.lattice_rows());
   throw table.error(first_line, fmt::format("the corners lie in rows of {}, but {}{}", found_cols,
@@ -199,12 +198,12 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
     if (!known.insert(name).second) {
       throw table.error(line, fmt::format("image '{}' occurs twice", name));
     }
-    const auto [image, part] = parse_part_of_image_name(lattice, table, line, name);
+    const auto [image, part] = parse_image_part(lattice, table, line, name);
     const auto [entry, is_new] = view_of_image.try_emplace(image, views.size());
     if (is_new) views.push_back({image, imager_px, {}});
     BoardView& view = views[entry->second];
     const bool none = end == from + 1 && !first_pixel;
-    if (!none && end - from != lattice.num_points_per_part()) {
+    if (!none && end - from != lattice.points_per_part()) {
       // [LENS-6] `image '...' has` | mrcal's table: a row for each corner, detected or not; one row
       //   with `-` without board | complete it
       throw table.error(line, fmt::format("image '{}' has {}", name,
@@ -212,7 +211,7 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
     }
     for (std::size_t i = from; i < end; ++i) {
       if (!table.rows[i].pixel) continue;
-      view.detection.points.push_back({lattice.point_index_on_board(part, i - from),
+      view.detection.points.push_back({lattice.board_point_index(part, i - from),
                                        *table.rows[i].pixel, 0, table.rows[i].weight});
     }
     if (!none) {
@@ -230,8 +229,8 @@ std::vector<BoardView> read_mrcal_corners(const std::filesystem::path& file, con
   check_row_length(board, lattice, table, images, first_line);
   if (lattice.num_board_parts() == 1) {
     for (BoardView& view : views) {
-      renumber_lattice_points(view.detection.points, lattice.lattice_cols(), lattice.lattice_rows(),
-                              board.kind == BoardKind::chessboard);
+      renumber_lattice(view.detection.points, lattice.lattice_cols(), lattice.lattice_rows(),
+                       board.kind == BoardKind::chessboard);
     }
   }
   return views;

@@ -20,7 +20,7 @@ namespace {
 constexpr int kDigits = 17;
 
 /// Formats all arguments of mrcal.optimize(), at the solution.
-std::string format_mrcal_optimization_inputs(const IntrinsicsSolution& solution) {
+std::string format_optimization(const IntrinsicsSolution& solution) {
   const BoardProblem& problem = solution.problem;
   const std::size_t boards = problem.poses.size();
   const auto rows = static_cast<std::size_t>(problem.rows);
@@ -62,32 +62,32 @@ std::string format_mrcal_optimization_inputs(const IntrinsicsSolution& solution)
        {"points", "observations_point", "indices_point_camintrinsics_camextrinsics"}) {
     archive.add_npz_array(none, std::string_view());
   }
-  return encode_base85(archive.serialize_npz_archive());
+  return encode_base85(archive.serialize());
 }
 
 }  // namespace
 
-void write_mrcal_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution,
-                             const ImageRegion& region) {
+void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution,
+                       const ImageRegion& region) {
   const BoardProblem& problem = solution.problem;
   std::string text = "{\n    'lensmodel':  '";
   text.append(lens_model_name(problem.lens_model)).append("',\n    'intrinsics': [");
   for (const double value : problem.intrinsics) {
-    text.append(" ").append(format_significant_digits(value, kDigits)).append(",");
+    text.append(" ").append(format_digits(value, kDigits)).append(",");
   }
   text += "],\n    'extrinsics': [ 0, 0, 0, 0, 0, 0 ],\n    'imagersize': [ ";
   text.append(std::to_string(problem.imager_px[0])).append(", ");
   text.append(std::to_string(problem.imager_px[1])).append(" ],\n    'icam_intrinsics': 0,\n");
-  text.append(format_mrcal_valid_region(region)).append("    'optimization_inputs': b'");
-  text.append(format_mrcal_optimization_inputs(solution)).append("',\n}\n");
+  text.append(format_mrcal_region(region)).append("    'optimization_inputs': b'");
+  text.append(format_optimization(solution)).append("',\n}\n");
   write_file(file, text);
 }
 
 namespace {
 
 /// Returns unique names of the views in the table.
-std::vector<std::string> make_image_names_unique(const IntrinsicsSolution& solution,
-                                                 std::span<const std::string> images) {
+std::vector<std::string> make_names_unique(const IntrinsicsSolution& solution,
+                                           std::span<const std::string> images) {
   std::vector<std::string> names;
   std::set<std::string> used_names;
   for (const std::size_t view : solution.views) {
@@ -107,13 +107,13 @@ void write_mrcal_corners(const std::filesystem::path& file, const IntrinsicsSolu
                          std::span<const std::string> images) {
   const BoardProblem& problem = solution.problem;
   const std::size_t parts = problem.poses.size() / solution.views.size();
-  const std::size_t count = problem.num_points_per_board();
+  const std::size_t count = problem.points_per_board();
   // mrcal truncates levels to integers from 0 on; an option makes it read weights instead.
   const bool weights = std::ranges::any_of(problem.points, [](const Eigen::Vector3d& point) {
     const double level = -std::log2(point.z());
     return point.z() > 0 && (level < 0 || level != std::floor(level));
   });
-  const std::vector<std::string> names = make_image_names_unique(solution, images);
+  const std::vector<std::string> names = make_names_unique(solution, images);
   std::string text = weights ? "# filename x y weight\n" : "# filename x y level\n";
   for (std::size_t board = 0; board < problem.poses.size(); ++board) {
     std::string name = names[board / parts];
@@ -122,9 +122,9 @@ void write_mrcal_corners(const std::filesystem::path& file, const IntrinsicsSolu
       const Eigen::Vector3d& point = problem.points[i];
       text += name;
       if (point.z() > 0) {
-        text.append(" ").append(format_significant_digits(point.x(), kDigits));
-        text.append(" ").append(format_significant_digits(point.y(), kDigits)).append(" ");
-        text.append(format_shortest_exact_number(weights ? point.z() : 0 - std::log2(point.z())))
+        text.append(" ").append(format_digits(point.x(), kDigits));
+        text.append(" ").append(format_digits(point.y(), kDigits)).append(" ");
+        text.append(format_exact_number(weights ? point.z() : 0 - std::log2(point.z())))
             .append("\n");
       } else {
         text += " -1 -1 -\n";

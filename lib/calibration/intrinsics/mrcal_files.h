@@ -24,9 +24,9 @@ namespace vlp {
 /// it shows less than IntrinsicsReport::expected_max_error_px, which is by tags
 /// (ProjectionUncertainty).
 /// @throws InputError
-/// @pre is_lens_model_supported_by_mrcal() of the lens model, also for write_mrcal_corners()
-void write_mrcal_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution,
-                             const ImageRegion& region);
+/// @pre can_mrcal_solve() of the lens model, also for write_mrcal_corners()
+void write_cameramodel(const std::filesystem::path& file, const IntrinsicsSolution& solution,
+                       const ImageRegion& region);
 
 /// Writes the corners of a solution in the format of mrcal-calibrate-cameras (--corners-cache),
 /// image by image and row by row of the lattice. Pixels are in px.
@@ -34,7 +34,7 @@ void write_mrcal_cameramodel(const std::filesystem::path& file, const Intrinsics
 /// @param images  file names of the views of the input, before views were dropped. A second image
 ///     of the same name becomes NAME-2, because the table identifies views by name.
 /// @throws InputError if the file cannot be written
-/// @pre is_lens_model_supported_by_mrcal() of the lens model
+/// @pre can_mrcal_solve() of the lens model
 ///
 /// The columns are `filename x y level` with level = -log2(weight). If a weight does not correspond
 /// to a whole level from 0 on, they are `filename x y weight` (--corners-cache-has-weights). A

@@ -6,8 +6,8 @@
 
 namespace vlp {
 
-/// Addresses of the functions of mrcal_adapter.cpp that implement solve_board_problem_by_mrcal()
-/// and linearize_board_problem_by_mrcal(). They are in a separate library, which is loaded at the
+/// Addresses of the functions of mrcal_adapter.cpp that implement solve_by_mrcal()
+/// and linearize_by_mrcal(). They are in a separate library, which is loaded at the
 /// first solve, because mrcal loads some 30 shared libraries.
 struct MrcalFunctions {
   bool (*solve)(BoardProblem&, const SolveOptions&);

@@ -95,7 +95,7 @@ void NumpyArchive::add_zip_file(const std::string& name, const std::string& cont
   ++count_;
 }
 
-std::string NumpyArchive::serialize_npz_archive() const {
+std::string NumpyArchive::serialize() const {
   std::string end = "PK\x05\x06";
   end.append(uint16_bytes(0))
       .append(uint16_bytes(0))

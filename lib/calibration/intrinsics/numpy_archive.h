@@ -34,7 +34,7 @@ class NumpyArchive {
   }
 
   /// Returns the complete archive.
-  std::string serialize_npz_archive() const;
+  std::string serialize() const;
 
  private:
   void add_npz_data(std::string_view name, std::string_view type, const Shape& shape,

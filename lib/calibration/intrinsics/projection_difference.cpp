@@ -27,7 +27,7 @@ struct Pair {
 };
 
 /// Fits the rotation of a to b by weighted least squares (Kabsch, 1976).
-Eigen::Matrix3d fit_rotation_between_lenses(const std::vector<Pair>& pairs) {
+Eigen::Matrix3d fit_lens_rotation(const std::vector<Pair>& pairs) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
   for (const Pair& pair : pairs) sum += pair.weight * pair.b * pair.a.transpose();
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(sum, Eigen::ComputeFullU | Eigen::ComputeFullV);
@@ -37,8 +37,8 @@ Eigen::Matrix3d fit_rotation_between_lenses(const std::vector<Pair>& pairs) {
 
 }  // namespace
 
-std::optional<Eigen::Matrix3d> fit_rotation_between_lenses(
-    const Lens& a, const Lens& b, std::span<const Eigen::Vector2d> pixels) {
+std::optional<Eigen::Matrix3d> fit_lens_rotation(const Lens& a, const Lens& b,
+                                                 std::span<const Eigen::Vector2d> pixels) {
   std::vector<Pair> pairs;
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto from_a = a.unproject_pixel(pixel), from_b = b.unproject_pixel(pixel);
@@ -46,11 +46,10 @@ std::optional<Eigen::Matrix3d> fit_rotation_between_lenses(
     pairs.push_back({pixel, from_a->direction.normalized(), from_b->direction.normalized(), 1});
   }
   if (pairs.size() < 3) return {};
-  return fit_rotation_between_lenses(pairs);
+  return fit_lens_rotation(pairs);
 }
 
-std::vector<Eigen::Vector2d> make_regular_pixel_grid(const std::array<int, 2>& imager_px,
-                                                     int cols) {
+std::vector<Eigen::Vector2d> make_pixel_grid(const std::array<int, 2>& imager_px, int cols) {
   const int rows =
       std::max(2, static_cast<int>(std::lround(cols * double(imager_px[1]) / imager_px[0])));
   std::vector<Eigen::Vector2d> pixels;
@@ -63,11 +62,11 @@ std::vector<Eigen::Vector2d> make_regular_pixel_grid(const std::array<int, 2>& i
   return pixels;
 }
 
-std::optional<ProjectionDifference> compute_projection_difference(
+std::optional<ProjectionDifference> compare_projections(
     const Lens& a, const Lens& b, const std::array<int, 2>& imager_px,
     const std::function<double(const Eigen::Vector2d&)>& sigma_px) {
   std::vector<Pair> pairs;
-  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
     const auto from_a = a.unproject_pixel(pixel), from_b = b.unproject_pixel(pixel);
     const double sigma = sigma_px(pixel);
     if (!from_a || !from_b || !(sigma > 0) || !std::isfinite(sigma)) continue;
@@ -75,7 +74,7 @@ std::optional<ProjectionDifference> compute_projection_difference(
                      1 / (sigma * sigma)});
   }
   if (pairs.size() < 3) return {};
-  const Eigen::Matrix3d rotation = fit_rotation_between_lenses(pairs);
+  const Eigen::Matrix3d rotation = fit_lens_rotation(pairs);
   ProjectionDifference difference{0, 0, 0};
   double count = 0;
   for (const Pair& pair : pairs) {
@@ -101,27 +100,27 @@ struct PixelDerivatives {
   Lens::SparseJacobian d_pixel_d_intrinsics;
 };
 
-std::vector<PixelDerivatives> compute_pixel_derivatives(const Lens& lens,
-                                                        const std::array<int, 2>& imager_px,
-                                                        const ImageRegion& region) {
+std::vector<PixelDerivatives> list_derivatives(const Lens& lens,
+                                               const std::array<int, 2>& imager_px,
+                                               const ImageRegion& region) {
   std::vector<PixelDerivatives> derivatives;
-  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
     if (!region.empty() && !polygon_contains(region, pixel)) continue;
     const auto seen = lens.unproject_pixel(pixel);
     if (!seen) continue;
     const Eigen::Vector3d ray = seen->direction.normalized();
-    const auto projection = lens.project_point_with_jacobians(ray);
+    const auto projection = lens.project_with_jacobians(ray);
     if (!projection) continue;
     derivatives.push_back({-projection->d_pixel_d_point * skew_symmetric_matrix(ray),
-                           *lens.compute_pixel_jacobian_wrt_intrinsics(ray)});
+                           *lens.differentiate_intrinsics(ray)});
   }
   return derivatives;
 }
 
 /// Returns the derivatives of the pixels with respect to the intrinsics. Each change of the
 /// intrinsics is combined with the rotation that removes most of it.
-std::vector<Eigen::MatrixXd> compute_aligned_derivatives(
-    const std::vector<PixelDerivatives>& derivatives, Eigen::Index intrinsics) {
+std::vector<Eigen::MatrixXd> align_derivatives(const std::vector<PixelDerivatives>& derivatives,
+                                               Eigen::Index intrinsics) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::MatrixXd right = Eigen::MatrixXd::Zero(3, intrinsics);
   for (const auto& [d_pixel_d_rotation, d_pixel_d_intrinsics] : derivatives) {
@@ -159,16 +158,14 @@ Eigen::MatrixXd draw_samples(const Eigen::MatrixXd& covariance) {
 
 }  // namespace
 
-ExpectedDifference compute_expected_projection_difference(const Lens& lens,
-                                                          const std::array<int, 2>& imager_px,
-                                                          const Eigen::MatrixXd& covariance,
-                                                          const ImageRegion& region) {
+ExpectedDifference predict_difference(const Lens& lens, const std::array<int, 2>& imager_px,
+                                      const Eigen::MatrixXd& covariance,
+                                      const ImageRegion& region) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   if (!covariance.allFinite()) return {inf, 1};
-  const auto derivatives = compute_pixel_derivatives(lens, imager_px, region);
+  const auto derivatives = list_derivatives(lens, imager_px, region);
   Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(covariance.rows(), covariance.rows());
-  for (const Eigen::MatrixXd& change :
-       compute_aligned_derivatives(derivatives, covariance.rows())) {
+  for (const Eigen::MatrixXd& change : align_derivatives(derivatives, covariance.rows())) {
     squares += change.transpose() * change;
   }
   const Eigen::MatrixXd terms =
@@ -177,16 +174,13 @@ ExpectedDifference compute_expected_projection_difference(const Lens& lens,
   return {std::sqrt(mean), mean * mean / (terms * terms).trace()};
 }
 
-double estimate_expected_max_projection_difference_px(const Lens& lens,
-                                                      const std::array<int, 2>& imager_px,
-                                                      const Eigen::MatrixXd& covariance,
-                                                      const ImageRegion& region) {
+double predict_max_difference_px(const Lens& lens, const std::array<int, 2>& imager_px,
+                                 const Eigen::MatrixXd& covariance, const ImageRegion& region) {
   if (!covariance.allFinite()) return std::numeric_limits<double>::infinity();
   const Eigen::MatrixXd samples = draw_samples(covariance);
   Eigen::RowVectorXd largest = Eigen::RowVectorXd::Zero(samples.cols());
-  const auto derivatives = compute_pixel_derivatives(lens, imager_px, region);
-  for (const Eigen::MatrixXd& change :
-       compute_aligned_derivatives(derivatives, covariance.rows())) {
+  const auto derivatives = list_derivatives(lens, imager_px, region);
+  for (const Eigen::MatrixXd& change : align_derivatives(derivatives, covariance.rows())) {
     largest = largest.cwiseMax((change * samples).colwise().squaredNorm());
   }
   return std::sqrt(largest.mean());

@@ -16,14 +16,13 @@ namespace vlp {
 
 /// Returns a regular grid of pixels (u, v) over the image including its edges, row by row. It has
 /// `cols` columns, and rows about equally far apart.
-std::vector<Eigen::Vector2d> make_regular_pixel_grid(const std::array<int, 2>& imager_px,
-                                                     int cols = 41);
+std::vector<Eigen::Vector2d> make_pixel_grid(const std::array<int, 2>& imager_px, int cols = 41);
 
 /// Fits the rotation R from the camera frame of `a` to that of `b`: unit rays of the same pixels
 /// satisfy ray_b = R ray_a. Least squares over the pixels for which both lenses have a ray.
 /// @return std::nullopt for fewer than three such pixels
-std::optional<Eigen::Matrix3d> fit_rotation_between_lenses(const Lens& a, const Lens& b,
-                                                           std::span<const Eigen::Vector2d> pixels);
+std::optional<Eigen::Matrix3d> fit_lens_rotation(const Lens& a, const Lens& b,
+                                                 std::span<const Eigen::Vector2d> pixels);
 
 /// Difference between the projections of two lenses over the image.
 struct ProjectionDifference {
@@ -33,7 +32,7 @@ struct ProjectionDifference {
   double rms_px;
 };
 
-/// Compares the projections of two lenses over the image. Every pixel of make_regular_pixel_grid()
+/// Compares the projections of two lenses over the image. Every pixel of make_pixel_grid()
 /// is unprojected by `a`, rotated by the best-fitting rotation of the rays and projected by `b`.
 /// The rotation is removed because the frame of a lens is a convention (mrcal, "Projection
 /// differences").
@@ -41,12 +40,12 @@ struct ProjectionDifference {
 /// @param sigma_px  standard deviation at a pixel, for the weights of the rotation; pixels with an
 ///     infinite one are skipped
 /// @return std::nullopt if the lenses have fewer than three such pixels in common
-std::optional<ProjectionDifference> compute_projection_difference(
+std::optional<ProjectionDifference> compare_projections(
     const Lens& a, const Lens& b, const std::array<int, 2>& imager_px,
     const std::function<double(const Eigen::Vector2d&)>& sigma_px);
 
 /// Expected difference between the projections of an estimated lens and the true one
-/// (compute_projection_difference()).
+/// (compare_projections()).
 struct ExpectedDifference {
   /// Expected RMS distance between the projections of the two lenses over the image, per axis, px.
   double rms_px;
@@ -61,19 +60,16 @@ struct ExpectedDifference {
 /// The difference is smaller than the projection uncertainty, which includes rotations of the
 /// camera relative to the boards. Aligning two lenses removes such rotations. Infinite if the
 /// covariance is not finite.
-ExpectedDifference compute_expected_projection_difference(const Lens& lens,
-                                                          const std::array<int, 2>& imager_px,
-                                                          const Eigen::MatrixXd& covariance,
-                                                          const ImageRegion& region = {});
+ExpectedDifference predict_difference(const Lens& lens, const std::array<int, 2>& imager_px,
+                                      const Eigen::MatrixXd& covariance,
+                                      const ImageRegion& region = {});
 
 /// Estimates the root of the expected square of the largest difference over the same pixels, px,
 /// from 200 random draws with a fixed seed.
 ///
 /// It exceeds the largest standard deviation of a single pixel, because the maximum is over many
 /// pixels. Infinite if the covariance is not finite.
-double estimate_expected_max_projection_difference_px(const Lens& lens,
-                                                      const std::array<int, 2>& imager_px,
-                                                      const Eigen::MatrixXd& covariance,
-                                                      const ImageRegion& region = {});
+double predict_max_difference_px(const Lens& lens, const std::array<int, 2>& imager_px,
+                                 const Eigen::MatrixXd& covariance, const ImageRegion& region = {});
 
 }  // namespace vlp

@@ -30,7 +30,7 @@ double compute_residual_sd(const BoardProblem& problem, const Eigen::VectorXd& r
 /// each view, from a row for each residual.
 Eigen::MatrixXd sum_rows_by_tag(const Eigen::MatrixXd& by_residual,
                                 const Eigen::VectorXd& residuals_px, const BoardLattice& lattice) {
-  const std::size_t points = lattice.num_points_per_part(),
+  const std::size_t points = lattice.points_per_part(),
                     points_per_view = lattice.num_board_parts() * points;
   const Eigen::Index corners = residuals_px.size() / 2;
   const auto views = static_cast<std::size_t>(corners) / points_per_view;
@@ -39,7 +39,7 @@ Eigen::MatrixXd sum_rows_by_tag(const Eigen::MatrixXd& by_residual,
   for (Eigen::Index i = 0; i < corners; ++i) {
     const auto corner = static_cast<std::size_t>(i);
     const std::size_t tag =
-        corner / points_per_view * points + lattice.find_tag_index_of_point(corner % points);
+        corner / points_per_view * points + lattice.get_tag_of_point(corner % points);
     sums.row(static_cast<Eigen::Index>(tag)) +=
         residuals_px.segment<2>(2 * i).transpose() * by_residual.middleRows<2>(2 * i);
   }
@@ -47,8 +47,8 @@ Eigen::MatrixXd sum_rows_by_tag(const Eigen::MatrixXd& by_residual,
 }
 
 /// Returns the factor n / (n - k) of ProjectionUncertainty.
-double compute_degrees_of_freedom_factor(const BoardProblem& problem, Eigen::Index states) {
-  const double count = 2 * static_cast<double>(collect_inlier_corner_pixels(problem).size());
+double compute_freedom_factor(const BoardProblem& problem, Eigen::Index states) {
+  const double count = 2 * static_cast<double>(list_inlier_pixels(problem).size());
   return count / std::max(count - static_cast<double>(states), 1.0);
 }
 
@@ -85,12 +85,11 @@ struct ProjectionUncertainty::Sensitivity {
   Eigen::Index num_states = 0;
   /// A row for each residual; empty if the views do not determine all parameters.
   Eigen::MatrixXd by_residual;
-  Eigen::VectorXd intrinsics_regularization_bias;
+  Eigen::VectorXd regularization_bias;
 };
 
 ProjectionUncertainty::Sensitivity::Sensitivity(const IntrinsicsSolution& solution)
-    : intrinsics_regularization_bias(
-          Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
+    : regularization_bias(Eigen::VectorXd::Zero(std::ssize(solution.problem.intrinsics))) {
   const BoardProblem& problem = solution.problem;
   const Linearization at = linearize_board_problem(problem, solution.solved_parameters);
   const Eigen::SparseMatrix<double>& jt = at.jacobian_transposed;
@@ -111,9 +110,8 @@ ProjectionUncertainty::Sensitivity::Sensitivity(const IntrinsicsSolution& soluti
   residuals_px = at.residuals_px;
   residual_sd_px = compute_residual_sd(problem, residuals_px);
   num_states = jt.rows();
-  intrinsics_regularization_bias =
-      wanted.leftCols(intrinsics).transpose() *
-      compute_regularization_bias(at, residual_sd_px, problem.noise_px);
+  regularization_bias = wanted.leftCols(intrinsics).transpose() *
+                        compute_regularization_bias(at, residual_sd_px, problem.noise_px);
 }
 
 ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution)
@@ -123,8 +121,7 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
                                              const BoardLattice& lattice)
     : ProjectionUncertainty(solution, Sensitivity(solution), &lattice) {}
 
-ProjectionUncertainty::ByCornersAndByTags
-ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(
+ProjectionUncertainty::ByCornersAndByTags ProjectionUncertainty::compare_corners_and_tags(
     const IntrinsicsSolution& solution, const BoardLattice& lattice) {
   const Sensitivity sensitivity(solution);
   return {ProjectionUncertainty(solution, sensitivity, nullptr),
@@ -136,7 +133,7 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
                                              const BoardLattice* lattice)
     : lens_(solution.fitted_lens()),
       is_determined_(false),
-      regularization_bias_(sensitivity.intrinsics_regularization_bias) {
+      regularization_bias_(sensitivity.regularization_bias) {
   const Eigen::MatrixXd& by_residual = sensitivity.by_residual;
   if (by_residual.size() == 0) return;
   if (lattice == nullptr) {
@@ -144,17 +141,17 @@ ProjectionUncertainty::ProjectionUncertainty(const IntrinsicsSolution& solution,
     covariance_ = sigma_px * sigma_px * by_residual.transpose() * by_residual;
   } else {
     const Eigen::MatrixXd sums = sum_rows_by_tag(by_residual, sensitivity.residuals_px, *lattice);
-    covariance_ = compute_degrees_of_freedom_factor(solution.problem, sensitivity.num_states) *
-                  sums.transpose() * sums;
+    covariance_ =
+        compute_freedom_factor(solution.problem, sensitivity.num_states) * sums.transpose() * sums;
   }
   is_determined_ = covariance_.allFinite();
 }
 
 Eigen::Matrix2d ProjectionUncertainty::projection_covariance(const Eigen::Vector2d& pixel) const {
   const auto ray = lens_.unproject_pixel(pixel);
-  const auto projection = ray ? lens_.project_point_with_jacobians(ray->direction) : std::nullopt;
+  const auto projection = ray ? lens_.project_with_jacobians(ray->direction) : std::nullopt;
   const auto derivatives =
-      projection ? lens_.compute_pixel_jacobian_wrt_intrinsics(ray->direction) : std::nullopt;
+      projection ? lens_.differentiate_intrinsics(ray->direction) : std::nullopt;
   if (!is_determined_ || !derivatives) {
     return Eigen::Matrix2d::Identity() * std::numeric_limits<double>::infinity();
   }
@@ -167,8 +164,7 @@ Eigen::Matrix2d ProjectionUncertainty::projection_covariance(const Eigen::Vector
   return gradient * state_covariance * gradient.transpose();
 }
 
-double ProjectionUncertainty::projection_sd_along_worst_direction_px(
-    const Eigen::Vector2d& pixel) const {
+double ProjectionUncertainty::worst_direction_sd_px(const Eigen::Vector2d& pixel) const {
   const Eigen::Matrix2d c = projection_covariance(pixel);
   if (!c.allFinite()) return std::numeric_limits<double>::infinity();
   const double mean = c.trace() / 2, half = (c(0, 0) - c(1, 1)) / 2;

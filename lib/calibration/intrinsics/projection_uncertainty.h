@@ -40,14 +40,14 @@ class ProjectionUncertainty {
   ProjectionUncertainty(const IntrinsicsSolution& solution, const BoardLattice& lattice);
 
   /// Returns false if the views do not determine all parameters.
-  bool are_intrinsics_determined() const { return is_determined_; }
+  bool is_determined() const { return is_determined_; }
 
   /// Returns the covariance of the projection of the ray at `pixel`, px^2. Infinite if the lens has
   /// no ray there, or if the views do not determine all parameters.
   Eigen::Matrix2d projection_covariance(const Eigen::Vector2d& pixel) const;
 
   /// Returns the standard deviation in the direction in which it is largest, px.
-  double projection_sd_along_worst_direction_px(const Eigen::Vector2d& pixel) const;
+  double worst_direction_sd_px(const Eigen::Vector2d& pixel) const;
 
   /// Returns the covariance of the intrinsics; 0 for the core of splined lenses, which is not
   /// estimated.
@@ -62,7 +62,7 @@ class ProjectionUncertainty {
   ///   (Jo' Jo + s^2 Jr' Jr)^-1 (1 - s^2) Jr' r,  s at least 0.01 and at most 1.
   /// 0 without regularization. Use it as a standard deviation of the intrinsics in addition to that
   /// from noise.
-  const Eigen::VectorXd& intrinsics_regularization_bias() const { return regularization_bias_; }
+  const Eigen::VectorXd& regularization_bias() const { return regularization_bias_; }
 
   /// Returns the standard deviation of the focal length along x, px. Infinite if the views do not
   /// determine all parameters, and for splined lenses, whose control points compensate the focal
@@ -73,8 +73,8 @@ class ProjectionUncertainty {
   struct ByCornersAndByTags;
   /// Computes both uncertainties from one linearization, which takes most of the time.
   /// @pre solution.has_succeeded(), with boards of that lattice
-  static ByCornersAndByTags compute_uncertainty_by_corners_and_by_tags(
-      const IntrinsicsSolution& solution, const BoardLattice& lattice);
+  static ByCornersAndByTags compare_corners_and_tags(const IntrinsicsSolution& solution,
+                                                     const BoardLattice& lattice);
 
  private:
   struct Sensitivity;

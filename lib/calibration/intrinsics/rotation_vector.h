@@ -17,7 +17,7 @@ inline Eigen::Matrix3d skew_symmetric_matrix(const Eigen::Vector3d& v) {
 
 /// Returns the rotation matrix exp(r) of a rotation vector r: right-handed rotation about the axis
 /// r / |r| by the angle |r|, rad. Returns the identity for r = 0.
-inline Eigen::Matrix3d rotation_matrix_from_rotation_vector(const Eigen::Vector3d& r) {
+inline Eigen::Matrix3d rotation_from_vector(const Eigen::Vector3d& r) {
   const double angle = r.norm();
   if (!(angle > 0)) return Eigen::Matrix3d::Identity();
   return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();

@@ -27,7 +27,7 @@ struct Equations {
 };
 
 /// Adds equations for small second differences of the control points, along columns and rows.
-void add_smoothness_equations(Equations& equations, const SplineGrid& grid) {
+void add_smoothness(Equations& equations, const SplineGrid& grid) {
   constexpr double weight = 3e-4;  // small: changes the fit by 1e-5 px
   const auto add = [&](int first, int apart) {
     const int row = equations.next();
@@ -47,7 +47,7 @@ void add_smoothness_equations(Equations& equations, const SplineGrid& grid) {
 
 /// Returns true if a surface without second differences is determined by its values at these
 /// points.
-bool is_bilinear_surface_determined(const std::vector<Eigen::Vector2d>& positions) {
+bool is_surface_determined(const std::vector<Eigen::Vector2d>& positions) {
   constexpr Eigen::Index unknowns = 4;
   if (std::ssize(positions) < unknowns) return false;
   Eigen::Array2d min_value = positions.front(), max_value = min_value;
@@ -68,17 +68,19 @@ bool is_bilinear_surface_determined(const std::vector<Eigen::Vector2d>& position
 
 }  // namespace
 
-std::optional<std::vector<double>> fit_splined_lens_to_lens(
-    const Lens& lens, const std::array<int, 2>& imager_px, LensModel model,
-    const std::vector<double>& core, const Eigen::Matrix3d& lens_from_splined) {
+std::optional<std::vector<double>> fit_splined_lens(const Lens& lens,
+                                                    const std::array<int, 2>& imager_px,
+                                                    LensModel model,
+                                                    const std::vector<double>& core,
+                                                    const Eigen::Matrix3d& lens_from_splined) {
   constexpr int rays_per_piece = 4;
   constexpr double margin = 0.05;  // of the image, around it
-  const SplineGrid grid = spline_grid_of_lens_model(model);
+  const SplineGrid grid = spline_grid_of(model);
   const SplineSurface straight(grid, std::vector<double>(2 * grid.num_control_points()));
   const Eigen::Array2d focal_px(core[0], core[1]), center_px(core[2], core[3]);
   const Eigen::Array2d size_px(imager_px[0], imager_px[1]);
   Equations equations;
-  add_smoothness_equations(equations, grid);
+  add_smoothness(equations, grid);
   std::vector<Eigen::Vector2d> positions;
   const int columns = rays_per_piece * (grid.nx - grid.order),
             rows = rays_per_piece * (grid.ny - grid.order);
@@ -93,7 +95,7 @@ std::optional<std::vector<double>> fit_splined_lens_to_lens(
         continue;
       }
       positions.push_back(u);
-      const SplineSurface::Weights at = straight.control_point_weights(u);
+      const SplineSurface::Weights at = straight.look_up_weights(u);
       for (int j = 0; j <= grid.order; ++j) {
         for (int i = 0; i <= grid.order; ++i) {
           equations.entries.emplace_back(
@@ -104,7 +106,7 @@ std::optional<std::vector<double>> fit_splined_lens_to_lens(
       equations.right.emplace_back(((pixel->array() - center_px) / focal_px).matrix() - u);
     }
   }
-  if (!is_bilinear_surface_determined(positions)) return {};
+  if (!is_surface_determined(positions)) return {};
   const auto points = static_cast<Eigen::Index>(grid.num_control_points());
   Eigen::SparseMatrix<double> left(equations.next(), points);
   left.setFromTriplets(equations.entries.begin(), equations.entries.end());
@@ -124,25 +126,23 @@ std::optional<std::vector<double>> fit_splined_lens_to_lens(
   return parameters;
 }
 
-std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<int, 2>& imager_px,
-                                            LensModel model, const std::vector<double>& core) {
+std::string explain_coarse_grid(const Lens& lens, const std::array<int, 2>& imager_px,
+                                LensModel model, const std::vector<double>& core) {
   constexpr double extension = 1.05;
   Eigen::Vector2d farthest(0, 0);
-  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(imager_px)) {
     const auto ray = lens.unproject_pixel(pixel);
     if (!ray) continue;
     const Eigen::Vector3d& x = ray->direction;
     farthest = farthest.cwiseMax(x.head<2>().cwiseAbs() * (2 / (x.norm() + x.z())));
   }
-  SplineGrid finer = spline_grid_of_lens_model(model);
-  LensModel other =
-      lens_model_for_spline_grid(resize_spline_grid_to_reach(finer, extension * farthest));
-  while (!fit_splined_lens_to_lens(lens, imager_px, other, core) &&
-         2 * finer.nx <= SplineGrid::kMaxKnots) {
+  SplineGrid finer = spline_grid_of(model);
+  LensModel other = splined_lens_model(resize_spline_grid(finer, extension * farthest));
+  while (!fit_splined_lens(lens, imager_px, other, core) && 2 * finer.nx <= SplineGrid::kMaxKnots) {
     finer.nx *= 2;
-    other = lens_model_for_spline_grid(resize_spline_grid_to_reach(finer, extension * farthest));
+    other = splined_lens_model(resize_spline_grid(finer, extension * farthest));
   }
-  const bool helps = fit_splined_lens_to_lens(lens, imager_px, other, core).has_value();
+  const bool helps = fit_splined_lens(lens, imager_px, other, core).has_value();
   const auto angle_deg = [](double u) { return deg_from_rad(2 * std::atan(u / 2)); };
   return fmt::format(
       "the control points of {} do not cover the field of view, {:.0f} degrees off axis "
@@ -151,7 +151,7 @@ std::string describe_too_coarse_spline_grid(const Lens& lens, const std::array<i
       helps ? fmt::format("--lens {}", lens_model_name(other)) : "another model");
 }
 
-SplineGrid resize_spline_grid_to_reach(const SplineGrid& grid, const Eigen::Vector2d& u) {
+SplineGrid resize_spline_grid(const SplineGrid& grid, const Eigen::Vector2d& u) {
   constexpr double numeric_tolerance = 1e-9;  // keeps a grid that is wide enough
   const auto ceil_and_clamp = [](double min_value, double value, double max_value) {
     return static_cast<int>(std::clamp(std::ceil(value - numeric_tolerance), min_value, max_value));
@@ -166,8 +166,7 @@ SplineGrid resize_spline_grid_to_reach(const SplineGrid& grid, const Eigen::Vect
   return wide;
 }
 
-std::vector<double> fit_core_intrinsics_of_splined_lens(const Lens& lens,
-                                                        std::span<const Eigen::Vector2d> pixels) {
+std::vector<double> fit_spline_core(const Lens& lens, std::span<const Eigen::Vector2d> pixels) {
   Eigen::Array2d products(0, 0), squares(0, 0);
   for (const Eigen::Vector2d& pixel : pixels) {
     const auto ray = lens.unproject_pixel(pixel);

@@ -19,7 +19,7 @@ namespace vlp {
 namespace {
 
 /// Returns the detection with corners corrected for one of kGammas.
-BoardDetection correct_corners_for_tone_curve(const BoardDetection& seen, std::size_t curve) {
+BoardDetection correct_corners(const BoardDetection& seen, std::size_t curve) {
   BoardDetection corrected;
   for (const TagDetection& tag : seen.tags) {
     if (curve == 0 || tag.tone_curve_fits.empty()) {
@@ -39,8 +39,7 @@ std::vector<const BoardDetection*> select_detections(const std::vector<BoardView
   constexpr std::size_t max_views = 24;
   std::vector<const BoardDetection*> sufficient;
   for (const BoardView& view : views) {
-    if (lattice.are_corners_sufficient_for_pose(view.detection))
-      sufficient.push_back(&view.detection);
+    if (lattice.can_determine_pose(view.detection)) sufficient.push_back(&view.detection);
   }
   if (sufficient.size() <= max_views) return sufficient;
   std::vector<const BoardDetection*> selected;
@@ -63,8 +62,8 @@ std::optional<double> compute_median_sd_px(const IntrinsicsInput& input) {
 
 /// Returns the RMS residual of the lens for each curve, divided by the noise of the corners;
 /// std::nullopt if no lens is found.
-std::optional<ValuesPerGamma> compute_residual_noise_ratios(const std::vector<BoardView>& views,
-                                                            const Board& board) {
+std::optional<ValuesPerGamma> compare_gammas(const std::vector<BoardView>& views,
+                                             const Board& board) {
   constexpr double exact_px = 1e-6;
   IntrinsicsInput input{BoardLattice(board), {}, views.front().imager_px, LensModel::opencv8};
   auto selected = select_detections(views, input.lattice);
@@ -72,8 +71,7 @@ std::optional<ValuesPerGamma> compute_residual_noise_ratios(const std::vector<Bo
   for (std::size_t curve = 0; curve < ratios.size(); ++curve) {
     input.views.clear();
     for (const BoardDetection* seen : selected) {
-      input.views.push_back(input.lattice.list_corners_with_board_positions(
-          correct_corners_for_tone_curve(*seen, curve)));
+      input.views.push_back(input.lattice.list_corners(correct_corners(*seen, curve)));
     }
     const IntrinsicsSolution solution =
         curve == 0 ? solve_opencv8_or_fisheye(InitialSolutions(input)) : solve_intrinsics(input);
@@ -101,23 +99,23 @@ bool may_have_tone_curve(const BoardView& view) {
 
 }  // namespace
 
-double estimate_and_correct_tone_curve(std::vector<BoardView>& views, const Board& board) {
+double correct_tone_curve(std::vector<BoardView>& views, const Board& board) {
   constexpr double levels_sd = 0.2, residuals = 50;
   const ValuesPerGamma level_costs = sum_tone_curve_costs(views);
   const bool has_no_curve = 2 * std::ranges::count_if(views, may_have_tone_curve) <=
                             std::ranges::count_if(views, has_gray_level_costs);
   if (has_no_curve || !check_board_layout(board, views, {}).problem.empty())
-    return correct_views_for_tone_curve(views, level_costs);
-  const auto ratios = compute_residual_noise_ratios(views, board);
-  if (!ratios) return correct_views_for_tone_curve(views, level_costs);
-  const double levels_gamma = estimate_tone_curve_gamma(level_costs);
+    return correct_views(views, level_costs);
+  const auto ratios = compare_gammas(views, board);
+  if (!ratios) return correct_views(views, level_costs);
+  const double levels_gamma = estimate_gamma(level_costs);
   const double n = residuals / *std::ranges::min_element(*ratios);
   ValuesPerGamma costs{};
   for (std::size_t i = 0; i < costs.size(); ++i) {
     const double off = std::log(kGammas[i] / levels_gamma) / levels_sd;
     costs[i] = n * std::log((*ratios)[i]) + off * off / 2;
   }
-  return correct_views_for_tone_curve(views, costs);
+  return correct_views(views, costs);
 }
 
 }  // namespace vlp

@@ -29,12 +29,12 @@ namespace vlp {
 ///
 /// Reason for both terms: gray values are precise but biased by JPEG and sharpening (20 % RMS of
 /// gamma). A wrong curve displaces edges by fractions of their blur, which differ from tag to tag
-/// with its width. No lens and no smooth edge shift of a view (estimate_tag_edge_displacements())
+/// with its width. No lens and no smooth edge shift of a view (fit_displacements())
 /// absorbs such displacements.
 ///
 /// Reason for n: thousands of residuals do not determine gamma as precisely as exact ratios would.
 /// With n, a ratio of 2 % weighs as much as the gray values, and less if the noise explains few of
 /// the residuals.
-double estimate_and_correct_tone_curve(std::vector<BoardView>& views, const Board& board);
+double correct_tone_curve(std::vector<BoardView>& views, const Board& board);
 
 }  // namespace vlp

@@ -78,8 +78,8 @@ using HasRays = std::function<bool(const Eigen::Vector2d&)>;
 
 /// Returns the last point with rays on the line from `inside`, which has them, to `outside`, less a
 /// distance that keeps the edges between such points inside.
-Eigen::Vector2d find_end_of_rays(const HasRays& has_rays, const Eigen::Vector2d& inside,
-                                 const Eigen::Vector2d& outside) {
+Eigen::Vector2d bisect_end_of_rays(const HasRays& has_rays, const Eigen::Vector2d& inside,
+                                   const Eigen::Vector2d& outside) {
   constexpr double tolerance_px = 0.01, distance_px = 0.25;
   const Eigen::Vector2d line = outside - inside;
   const double length_px = line.norm();
@@ -93,8 +93,8 @@ Eigen::Vector2d find_end_of_rays(const HasRays& has_rays, const Eigen::Vector2d&
 
 /// Returns the mean of the corners, or else the corner nearest to it that has rays; std::nullopt if
 /// none has.
-std::optional<Eigen::Vector2d> find_center_with_rays(std::vector<Eigen::Vector2d> corners_px,
-                                                     const HasRays& has_rays) {
+std::optional<Eigen::Vector2d> find_center(std::vector<Eigen::Vector2d> corners_px,
+                                           const HasRays& has_rays) {
   const Eigen::Vector2d mean =
       std::accumulate(corners_px.begin(), corners_px.end(), Eigen::Vector2d(0, 0)) /
       static_cast<double>(corners_px.size());
@@ -112,7 +112,7 @@ ImageRegion clip_to_rays(const ImageRegion& region, const HasRays& has_rays,
   std::vector<bool> has_ray;
   std::ranges::transform(points, std::back_inserter(has_ray), has_rays);
   if (std::ranges::find(has_ray, false) == has_ray.end()) return region;
-  const auto inside = find_center_with_rays(corners_px, has_rays);
+  const auto inside = find_center(corners_px, has_rays);
   if (!inside) return {};
   ImageRegion clipped;
   const std::size_t count = points.size();
@@ -120,7 +120,7 @@ ImageRegion clip_to_rays(const ImageRegion& region, const HasRays& has_rays,
     const bool is_vertex = std::ranges::find(region, points[i]) != region.end();
     const bool is_beside = !has_ray[(i + 1) % count] || !has_ray[(i + count - 1) % count];
     if (!has_ray[i]) {
-      clipped.push_back(find_end_of_rays(has_rays, *inside, points[i]));
+      clipped.push_back(bisect_end_of_rays(has_rays, *inside, points[i]));
     } else if (is_vertex || is_beside) {
       clipped.push_back(points[i]);
     }
@@ -130,9 +130,9 @@ ImageRegion clip_to_rays(const ImageRegion& region, const HasRays& has_rays,
 
 }  // namespace
 
-ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corners_px,
-                                      const std::array<int, 2>& imager_px, const Lens& lens,
-                                      std::span<const Lens> others) {
+ImageRegion make_valid_region(const std::vector<Eigen::Vector2d>& corners_px,
+                              const std::array<int, 2>& imager_px, const Lens& lens,
+                              std::span<const Lens> others) {
   constexpr double model_margin = 0.04, spacing = 0.02;
   const double margin = is_splined_lens_model(lens.lens_model()) ? 0 : model_margin;
   const Eigen::Vector2d last(imager_px[0] - 1, imager_px[1] - 1);
@@ -152,7 +152,7 @@ ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corner
   }
   constexpr double whole = 0.985;
   if (region.empty()) return region;
-  if (compute_region_fraction_of_image_area(region, imager_px) >= whole)
+  if (compute_area_fraction(region, imager_px) >= whole)
     region = {{0, 0}, {last.x(), 0}, last, {0, last.y()}};
   const auto has_rays = [&](const Eigen::Vector2d& pixel) {
     return lens.unproject_pixel(pixel) && std::ranges::all_of(others, [&](const Lens& other) {
@@ -162,8 +162,7 @@ ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corner
   return clip_to_rays(region, has_rays, corners_px, spacing * last.norm());
 }
 
-double compute_region_fraction_of_image_area(const ImageRegion& region,
-                                             const std::array<int, 2>& imager_px) {
+double compute_area_fraction(const ImageRegion& region, const std::array<int, 2>& imager_px) {
   return compute_polygon_area(region) / ((imager_px[0] - 1.0) * (imager_px[1] - 1.0));
 }
 

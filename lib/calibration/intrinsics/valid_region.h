@@ -30,13 +30,12 @@ using ImageRegion = std::vector<Eigen::Vector2d>;
 /// no ray, it moves towards the mean of the corners, to 0.25 px inside the image of the rays. If
 /// that mean has no ray, the nearest corner with one replaces it; without any the region is empty.
 /// This assumes that each line from there leaves the image of the rays once.
-ImageRegion compute_valid_lens_region(const std::vector<Eigen::Vector2d>& corners_px,
-                                      const std::array<int, 2>& imager_px, const Lens& lens,
-                                      std::span<const Lens> others = {});
+ImageRegion make_valid_region(const std::vector<Eigen::Vector2d>& corners_px,
+                              const std::array<int, 2>& imager_px, const Lens& lens,
+                              std::span<const Lens> others = {});
 
 /// Computes the area of a region as a fraction of the image. The image extends from the center of
 /// its first pixel to that of its last.
-double compute_region_fraction_of_image_area(const ImageRegion& region,
-                                             const std::array<int, 2>& imager_px);
+double compute_area_fraction(const ImageRegion& region, const std::array<int, 2>& imager_px);
 
 }  // namespace vlp

@@ -17,9 +17,9 @@ struct Layout {
 
 /// Computes the equations of `count` columns of the transposed Jacobian, with the boards from
 /// `pose` on.
-ViewEquations::View compute_view_equations(const Linearization& at, const Layout& layout,
-                                           Eigen::Index first, Eigen::Index count,
-                                           Eigen::Index pose, Eigen::Index boards) {
+ViewEquations::View make_view_equations(const Linearization& at, const Layout& layout,
+                                        Eigen::Index first, Eigen::Index count, Eigen::Index pose,
+                                        Eigen::Index boards) {
   const Eigen::Index shared = layout.shared(), num_pose_states = 6 * boards;
   Eigen::MatrixXd normal =
       Eigen::MatrixXd::Zero(shared + num_pose_states, shared + num_pose_states);
@@ -54,9 +54,8 @@ ViewEquations::View compute_view_equations(const Linearization& at, const Layout
 
 /// Returns the change of the common parameters if views with this normal matrix and gradient are
 /// left out, to first order; infinite if the others do not determine a lens.
-Eigen::VectorXd compute_change_without_views(const ViewEquations& equations,
-                                             const Eigen::MatrixXd& normal,
-                                             const Eigen::VectorXd& gradient) {
+Eigen::VectorXd solve_without_views(const ViewEquations& equations, const Eigen::MatrixXd& normal,
+                                    const Eigen::VectorXd& gradient) {
   const Eigen::LDLT<Eigen::MatrixXd> remaining(equations.normal - normal);
   if (remaining.isPositive() && remaining.vectorD().minCoeff() > 0)
     return remaining.solve(gradient);
@@ -74,24 +73,23 @@ ViewEquations::ViewEquations(const IntrinsicsSolution& solution) {
   const Eigen::Index rows = at.residuals_px.size(), rows_of_view = rows / num_views;
   num_intrinsics = static_cast<Eigen::Index>(problem.intrinsics.size());
   scale = at.scale.head(at.poses);
-  normal =
-      compute_view_equations(at, layout, rows, at.jacobian_transposed.cols() - rows, 0, 0).normal;
+  normal = make_view_equations(at, layout, rows, at.jacobian_transposed.cols() - rows, 0, 0).normal;
   views.reserve(solution.views.size());
   for (Eigen::Index view = 0; view < num_views; ++view) {
-    views.push_back(compute_view_equations(at, layout, view * rows_of_view, rows_of_view,
-                                           view * boards / num_views, boards / num_views));
+    views.push_back(make_view_equations(at, layout, view * rows_of_view, rows_of_view,
+                                        view * boards / num_views, boards / num_views));
     normal += views.back().normal;
   }
 }
 
-Eigen::MatrixXd estimate_intrinsics_covariance_by_jackknife(const ViewEquations& equations) {
+Eigen::MatrixXd jackknife_covariance(const ViewEquations& equations) {
   const auto views = std::ssize(equations.views);
   const Eigen::Index intrinsics = equations.num_intrinsics, solved = equations.scale.size();
   Eigen::MatrixXd changes = Eigen::MatrixXd::Zero(intrinsics, views);
   for (Eigen::Index view = 0; view < views; ++view) {
     const auto& [normal, gradient, squares, count] =
         equations.views[static_cast<std::size_t>(view)];
-    const Eigen::VectorXd change = compute_change_without_views(equations, normal, gradient);
+    const Eigen::VectorXd change = solve_without_views(equations, normal, gradient);
     if (!change.allFinite()) {
       return Eigen::MatrixXd::Constant(intrinsics, intrinsics,
                                        std::numeric_limits<double>::infinity());
@@ -103,8 +101,8 @@ Eigen::MatrixXd estimate_intrinsics_covariance_by_jackknife(const ViewEquations&
   return (n - 1) / n * changes * changes.transpose();
 }
 
-std::vector<double> compute_left_out_mean_squares_px2(const ViewEquations& equations,
-                                                      std::size_t blocks) {
+std::vector<double> compute_left_out_squares_px2(const ViewEquations& equations,
+                                                 std::size_t blocks) {
   constexpr double inf = std::numeric_limits<double>::infinity();
   const std::size_t views = equations.views.size();
   std::vector<double> squares_px2;
@@ -115,8 +113,7 @@ std::vector<double> compute_left_out_mean_squares_px2(const ViewEquations& equat
       block.normal += equations.views[end].normal;
       block.gradient += equations.views[end].gradient;
     }
-    const Eigen::VectorXd change =
-        compute_change_without_views(equations, block.normal, block.gradient);
+    const Eigen::VectorXd change = solve_without_views(equations, block.normal, block.gradient);
     for (; first < end; ++first) {
       const auto& [normal, gradient, squares, count] = equations.views[first];
       const double added = 2 * change.dot(gradient) + change.dot(normal * change);

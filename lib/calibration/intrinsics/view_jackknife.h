@@ -44,7 +44,7 @@ struct ViewEquations {
 /// independence of views only. It includes errors common to the corners of a view: a varying warp
 /// of the board, a rolling shutter, a lens model that does not fit. With few views it is imprecise,
 /// by a relative 1 / sqrt(2 (n - 1)), and often too large.
-Eigen::MatrixXd estimate_intrinsics_covariance_by_jackknife(const ViewEquations& equations);
+Eigen::MatrixXd jackknife_covariance(const ViewEquations& equations);
 
 /// Estimates the mean squared residual per axis of each view, px^2, for the lens of the views
 /// outside its block, to first order, with the pose of the view fitted. View i of n is in block
@@ -54,7 +54,7 @@ Eigen::MatrixXd estimate_intrinsics_covariance_by_jackknife(const ViewEquations&
 /// block) \ (sum of g in the block) of lens and warp, its sum of squares changes by 2 d' g + d' N
 /// d.
 /// @return infinity for a view if the views outside its block do not determine a lens
-std::vector<double> compute_left_out_mean_squares_px2(const ViewEquations& equations,
-                                                      std::size_t blocks);
+std::vector<double> compute_left_out_squares_px2(const ViewEquations& equations,
+                                                 std::size_t blocks);
 
 }  // namespace vlp

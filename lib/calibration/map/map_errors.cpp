@@ -56,7 +56,7 @@ struct LampDisplacements {
   }
 
   /// Returns the displaced position of a lamp, up to a similarity of all lamps.
-  Eigen::Vector2d displaced_lamp_position_m(std::size_t lamp) const {
+  Eigen::Vector2d displaced_lamp_m(std::size_t lamp) const {
     return map_m[lamp] + displacement_m.segment<2>(2 * static_cast<Eigen::Index>(lamp));
   }
 };
@@ -90,7 +90,7 @@ std::size_t count_detections(const std::vector<AdjustmentCapture>& captures) {
   return count;
 }
 
-std::map<int, int> count_captures_of_lamps(const std::vector<AdjustmentCapture>& captures) {
+std::map<int, int> count_captures(const std::vector<AdjustmentCapture>& captures) {
   std::map<int, int> counts;
   for (const AdjustmentCapture& capture : captures) {
     for (const Detection& detection : capture.detections) ++counts[detection.lamp];
@@ -99,14 +99,14 @@ std::map<int, int> count_captures_of_lamps(const std::vector<AdjustmentCapture>&
 }
 
 /// Removes detections that do not connect a lamp to other lamps.
-void remove_unconnected_detections(std::vector<AdjustmentCapture>& captures) {
+void remove_unconnected(std::vector<AdjustmentCapture>& captures) {
   constexpr std::size_t min_lamps = 3;
   constexpr int min_captures = 2;
   for (std::size_t removed = 1; removed > 0;) {
     std::erase_if(captures, [](const AdjustmentCapture& capture) {
       return capture.detections.size() < min_lamps;
     });
-    std::map<int, int> counts = count_captures_of_lamps(captures);
+    std::map<int, int> counts = count_captures(captures);
     removed = 0;
     for (AdjustmentCapture& capture : captures) {
       removed += std::erase_if(capture.detections, [&](const Detection& detection) {
@@ -166,12 +166,12 @@ struct MapCaptures {
     }
     LampDisplacements found;
     AdjustmentResult adjusted;
-    remove_unconnected_detections(input.captures);
+    remove_unconnected(input.captures);
     const std::size_t detections = count_detections(input.captures);
     // Rejected detections may leave others unconnected.
     for (std::size_t used = 0; count_detections(input.captures) != used;) {
       if (input.captures.empty()) return std::nullopt;
-      adjusted = run_bundle_adjustment(input, {no_limit, no_limit});
+      adjusted = adjust_bundle(input, {no_limit, no_limit});
       constexpr double max_residual_fraction = 0.01;  // of the focal length; lenses are better
       if (!adjusted.has_succeeded() ||
           adjusted.residual_px > max_residual_fraction * calibration.camera.focal_px().mean()) {
@@ -187,7 +187,7 @@ struct MapCaptures {
       }
       for (std::size_t i = 0; i < inliers.size(); ++i)
         input.captures[i].detections = std::move(inliers[i]);
-      remove_unconnected_detections(input.captures);
+      remove_unconnected(input.captures);
     }
     constexpr double min_degrees_of_freedom = 0.5;
     if (input.captures.empty() || !(adjusted.degrees_of_freedom > min_degrees_of_freedom))
@@ -195,7 +195,7 @@ struct MapCaptures {
     found.height_m = adjusted.lamp_height_m;
     found.inlier_fraction =
         static_cast<double>(count_detections(input.captures)) / static_cast<double>(detections);
-    set_displacements(map, adjusted, count_captures_of_lamps(input.captures), found);
+    set_displacements(map, adjusted, count_captures(input.captures), found);
     // Lamps without a tie move independently, by the size of a guess.
     if (!(found.covariance_m2.diagonal().maxCoeff() < std::pow(rms_radius(found.map_m), 2)))
       return std::nullopt;
@@ -231,31 +231,31 @@ struct MapCaptures {
 
 /// Returns the offset of a lamp after the similarity that maps the lamps without `excluded` to the
 /// map. Returns std::nullopt if there is no such similarity.
-std::optional<Eigen::Vector2d> compute_lamp_offset_relative_to_others(
-    const LampDisplacements& found, std::size_t lamp, const std::vector<std::size_t>& excluded) {
+std::optional<Eigen::Vector2d> find_lamp_offset(const LampDisplacements& found, std::size_t lamp,
+                                                const std::vector<std::size_t>& excluded) {
   std::vector<Eigen::Vector2d> from_m, to_m;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
     if (std::find(excluded.begin(), excluded.end(), i) != excluded.end()) continue;
-    from_m.push_back(found.displaced_lamp_position_m(i));
+    from_m.push_back(found.displaced_lamp_m(i));
     to_m.push_back(found.map_m[i]);
   }
   const auto to_map = fit_similarity_transform(
       from_m.size(), [&](std::size_t i) { return from_m[i]; },
       [&](std::size_t i) { return to_m[i]; });
   if (!to_map) return std::nullopt;
-  return to_map->offset + complex_product(to_map->factor, found.displaced_lamp_position_m(lamp)) -
+  return to_map->offset + complex_product(to_map->factor, found.displaced_lamp_m(lamp)) -
          found.map_m[lamp];
 }
 
 /// Computes the offset of each lamp from the similarity that fits the other lamps best. Omits lamps
 /// whose offset the other lamps do not determine.
-std::vector<LampOffset> compute_lamp_offsets_relative_to_others(const LampDisplacements& found) {
+std::vector<LampOffset> list_lamp_offsets(const LampDisplacements& found) {
   constexpr double min_own_fraction = 1e-3;
   std::vector<LampOffset> offsets;
   for (std::size_t i = 0; i < found.lamps.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);
     const double own_fraction = found.projector(row, row);
-    const auto offset_m = compute_lamp_offset_relative_to_others(found, i, {i});
+    const auto offset_m = find_lamp_offset(found, i, {i});
     if (own_fraction < min_own_fraction || !offset_m) continue;
     const Eigen::Vector2d sd_m =
         found.covariance_m2.diagonal().segment<2>(row).cwiseMax(0).cwiseSqrt() / own_fraction;
@@ -284,23 +284,23 @@ class DisplacementTest {
       variance_is_known_ = variance_is_known_ && sd_m;
       covariance(i, i) += sd_m.value_or(0) * sd_m.value_or(0) + kNumericVariance_m2;
     }
-    const auto range = eigendecompose_symmetric_matrix(found.projector);
+    const auto range = eigendecompose(found.projector);
     const Eigen::Index rank = (range.values.array() > 0.5).count();
     const Eigen::MatrixXd basis = range.vectors.rightCols(rank);
     const auto [values, vectors] =
-        eigendecompose_symmetric_matrix(Eigen::MatrixXd(basis.transpose() * covariance * basis));
+        eigendecompose(Eigen::MatrixXd(basis.transpose() * covariance * basis));
     variances_m2_ = values.cwiseMax(kNumericVariance_m2);
     basis_ = basis * vectors;
     coordinates_ = basis_.transpose() * found.displacement_m;
   }
 
-  Eigen::Index count_determined_unknowns() const { return basis_.cols(); }
+  Eigen::Index count_determined() const { return basis_.cols(); }
 
   /// Fits offsets of the free lamps to the coordinates, with the variance of the other lamps.
   Fit fit_map_errors(const std::vector<std::size_t>& free, double added_m2) const {
     const auto size = 2 * std::ssize(free);
     const Eigen::ArrayXd weights = (variances_m2_.array() + added_m2).inverse();
-    Eigen::MatrixXd jacobian(size, count_determined_unknowns());
+    Eigen::MatrixXd jacobian(size, count_determined());
     for (Eigen::Index k = 0; k < size; k += 2) {
       const auto lamp = static_cast<Eigen::Index>(free[static_cast<std::size_t>(k / 2)]);
       jacobian.middleRows<2>(k) = basis_.middleRows<2>(2 * lamp);
@@ -308,16 +308,16 @@ class DisplacementTest {
     const Eigen::MatrixXd weighted = jacobian * weights.matrix().asDiagonal();
     const Eigen::VectorXd gradient = weighted * coordinates_;
     Fit fit{(weights * coordinates_.array().square()).sum(), {}, {}};
-    fit.covariance_m2 = solve_symmetric_system(weighted * jacobian.transpose(),
-                                               Eigen::MatrixXd::Identity(size, size));
+    fit.covariance_m2 =
+        solve_symmetric(weighted * jacobian.transpose(), Eigen::MatrixXd::Identity(size, size));
     fit.offsets_m = fit.covariance_m2 * gradient;
     fit.chi_squared -= gradient.dot(fit.offsets_m);
     return fit;
   }
 
   /// Returns the variance to add to the known ones, so that chi^2 equals its degrees of freedom.
-  double compute_added_variance_m2(const std::vector<std::size_t>& free) const {
-    const double freedom = static_cast<double>(count_determined_unknowns() - 2 * std::ssize(free));
+  double compute_added_m2(const std::vector<std::size_t>& free) const {
+    const double freedom = static_cast<double>(count_determined() - 2 * std::ssize(free));
     double low = 0, high = coordinates_.squaredNorm() / freedom;
     if (fit_map_errors(free, 0).chi_squared <= freedom) return 0;
     constexpr int iterations = 60;
@@ -329,18 +329,17 @@ class DisplacementTest {
   }
 
   /// Returns the bound of a drop of chi^2 if `tests` sets of `free` lamps are tested together.
-  double compute_chi_squared_drop_bound(std::size_t free, double tests) const {
+  double compute_drop_bound(std::size_t free, double tests) const {
     const double exponent = -2 * std::log(kFalseAlarm / tests);
     if (variance_is_known_) return exponent;
-    const double freedom =
-        static_cast<double>(count_determined_unknowns()) - 2 * static_cast<double>(free);
+    const double freedom = static_cast<double>(count_determined()) - 2 * static_cast<double>(free);
     return freedom * std::expm1(exponent / freedom);
   }
 
   /// Adds the lamp, other than `excluded`, that reduces chi^2 most together with the free ones.
   /// Returns chi^2.
-  double add_best_explaining_error(std::vector<std::size_t>& free, double added_m2,
-                                   std::optional<std::size_t> excluded = {}) const {
+  double add_best_error(std::vector<std::size_t>& free, double added_m2,
+                        std::optional<std::size_t> excluded = {}) const {
     std::size_t best = 0;
     double smallest = std::numeric_limits<double>::infinity();
     free.push_back(0);
@@ -363,12 +362,12 @@ class DisplacementTest {
     for (std::size_t k = 0; k < free.size(); ++k) {
       sets *= static_cast<double>(lamps_ - k) / static_cast<double>(k + 1);
     }
-    const double limit = fit_map_errors(free, added_m2).chi_squared +
-                         compute_chi_squared_drop_bound(free.size(), sets);
+    const double limit =
+        fit_map_errors(free, added_m2).chi_squared + compute_drop_bound(free.size(), sets);
     return std::all_of(free.begin(), free.end(), [&](std::size_t lamp) {
       std::vector<std::size_t> other = free;
       std::erase(other, lamp);
-      return add_best_explaining_error(other, added_m2, lamp) > limit;
+      return add_best_error(other, added_m2, lamp) > limit;
     });
   }
 
@@ -395,7 +394,7 @@ struct OtherMap {
   std::optional<LampDisplacements> found = {};
 
   /// Returns the RMS displacement of the lamps; infinity if the captures contradict the map.
-  double compute_rms_displacement_m() const {
+  double compute_rms_m() const {
     if (is_map_contradicted(found)) return std::numeric_limits<double>::infinity();
     return found->displacement_m.norm() / std::sqrt(static_cast<double>(found->lamps.size()));
   }
@@ -465,7 +464,7 @@ std::vector<OtherMap> make_all_swapped_maps(const LampMap& map) {
 
 /// Returns true if the RMS displacement of the lamps exceeds the tolerance of Positioner, relative
 /// to the size of the map.
-bool is_map_of_other_room(const LampDisplacements& found) {
+bool is_other_room(const LampDisplacements& found) {
   constexpr double max_residual_fraction = 0.1;  // PositionerOptions::max_residual_fraction
   const double rms_m =
       found.displacement_m.norm() / std::sqrt(static_cast<double>(found.lamps.size()));
@@ -475,7 +474,7 @@ bool is_map_of_other_room(const LampDisplacements& found) {
 /// Returns true if a map explains the captures: most detections agree, and the displacement of the
 /// lamps is small. Survey errors stay far below this limit.
 bool explains_captures(const OtherMap& other) {
-  return !is_map_contradicted(other.found) && !is_map_of_other_room(*other.found);
+  return !is_map_contradicted(other.found) && !is_other_room(*other.found);
 }
 
 /// Finds two lamps that are swapped, or a mirrored map. The captures have to fit the alternative
@@ -495,17 +494,16 @@ std::optional<MapError> find_swapped_lamps(const MapCaptures& captures, const La
   if (is_contradicted) options.max_captures = std::min(options.max_captures, max_captures);
   const MapCaptures few{captures.frames, captures.calibration, options};
   for (OtherMap& other : others) other.found = few.estimate_displacements(other.map);
-  std::ranges::sort(others.begin(), others.end() - 1, {}, &OtherMap::compute_rms_displacement_m);
+  std::ranges::sort(others.begin(), others.end() - 1, {}, &OtherMap::compute_rms_m);
   // The mirror image of a square equals a square with two corners swapped.
-  const bool is_mirrored =
-      others.back().compute_rms_displacement_m() <= 2 * others.front().compute_rms_displacement_m();
+  const bool is_mirrored = others.back().compute_rms_m() <= 2 * others.front().compute_rms_m();
   const std::size_t best = is_mirrored ? others.size() - 1 : 0;
   if (!explains_captures(others[best])) return std::nullopt;
   const DisplacementTest test(*others[best].found, map);
-  const double added_m2 = test.compute_added_variance_m2({});
+  const double added_m2 = test.compute_added_m2({});
   const auto count = static_cast<double>(map.lamps.size());
   const double limit = test.fit_map_errors({}, added_m2).chi_squared +
-                       test.compute_chi_squared_drop_bound(0, 1 + count * (count - 1) / 2);
+                       test.compute_drop_bound(0, 1 + count * (count - 1) / 2);
   const auto is_worse = [&](const std::optional<LampDisplacements>& other) {
     return is_map_contradicted(other) || other->lamps.size() < others[best].found->lamps.size() ||
            DisplacementTest(*other, map).fit_map_errors({}, added_m2).chi_squared > limit;
@@ -516,27 +514,27 @@ std::optional<MapError> find_swapped_lamps(const MapCaptures& captures, const La
 }
 
 /// Finds the displaced lamps: the largest set in which each lamp is significant.
-std::vector<MapError> find_moved_lamps(const LampDisplacements& found,
-                                       const DisplacementTest& test) {
+std::vector<MapError> collect_moved_lamps(const LampDisplacements& found,
+                                          const DisplacementTest& test) {
   constexpr std::size_t max_lamps = 8;  // more lamps indicate an error of the whole map
   std::vector<std::size_t> free, moved;
   while (free.size() < max_lamps && 2 * (free.size() + 1) < found.lamps.size() &&
-         test.count_determined_unknowns() > 2 * std::ssize(free) + 2) {
-    test.add_best_explaining_error(free, test.compute_added_variance_m2(free));
-    if (test.is_significant(free, test.compute_added_variance_m2(free))) {
+         test.count_determined() > 2 * std::ssize(free) + 2) {
+    test.add_best_error(free, test.compute_added_m2(free));
+    if (test.is_significant(free, test.compute_added_m2(free))) {
       moved = free;
     }
   }
   std::vector<MapError> errors;
   if (moved.empty()) return errors;
-  const auto fit = test.fit_map_errors(moved, test.compute_added_variance_m2(moved));
+  const auto fit = test.fit_map_errors(moved, test.compute_added_m2(moved));
   for (std::size_t k = 0; k < moved.size(); ++k) {
     const auto row = 2 * static_cast<Eigen::Index>(k);
     errors.push_back({MapErrorKind::moved, {found.lamps[moved[k]]}});
     MapError& error = errors.back();
     // Exact offset; the one in d is linearized.
-    error.offset_m.head<2>() = compute_lamp_offset_relative_to_others(found, moved[k], moved)
-                                   .value_or(fit.offsets_m.segment<2>(row));
+    error.offset_m.head<2>() =
+        find_lamp_offset(found, moved[k], moved).value_or(fit.offsets_m.segment<2>(row));
     error.sd_m.head<2>() = fit.covariance_m2.diagonal().segment<2>(row).cwiseSqrt();
   }
   return errors;
@@ -544,9 +542,8 @@ std::vector<MapError> find_moved_lamps(const LampDisplacements& found,
 
 /// Finds the lamp with most of the outliers: at least two, in more than 10 % of its captures. Their
 /// median has to exceed `min_outlier_px` and three standard deviations of the lamp's survey.
-std::optional<MapError> find_lamp_at_varying_position(const LampDisplacements& found,
-                                                      const LampMap& map, double min_outlier_px,
-                                                      double focal_px) {
+std::optional<MapError> find_varying_lamp(const LampDisplacements& found, const LampMap& map,
+                                          double min_outlier_px, double focal_px) {
   constexpr std::size_t min_outliers = 2;
   constexpr double min_fraction = 0.1, max_survey_sigmas = 3;
   std::size_t all = 0;
@@ -628,26 +625,25 @@ std::string describe_map_errors(std::span<const MapError> errors) {
   return text;
 }
 
-std::string describe_lamps_moved_since_calibration(int lamps) {
+std::string describe_moved_lamps(int lamps) {
   return fmt::format(
       "{} lamps have other positions than in the adjustment of the calibration, and sd lacks their "
       "uncertainty: give the map that vlp-adjust --refine-map wrote with it",
       lamps);
 }
 
-bool MapErrors::is_lamp_map_unusable() const {
+bool MapErrors::is_map_unusable() const {
   return std::any_of(errors.begin(), errors.end(), [](const MapError& error) {
     return error.kind == MapErrorKind::swapped || error.kind == MapErrorKind::mirrored;
   });
 }
 
-MapErrors detect_misplaced_or_swapped_lamps(std::span<const Frame> frames, const LampMap& map,
-                                            const Calibration& calibration,
-                                            const MapErrorOptions& options) {
+MapErrors detect_map_errors(std::span<const Frame> frames, const LampMap& map,
+                            const Calibration& calibration, const MapErrorOptions& options) {
   const MapCaptures captures{frames, calibration, options};
   const auto found = captures.estimate_displacements(map);
   MapErrors result;
-  if (found) result.offsets = compute_lamp_offsets_relative_to_others(*found);
+  if (found) result.offsets = list_lamp_offsets(*found);
   if (auto exchange = find_swapped_lamps(captures, map, found)) {
     result.errors.push_back(std::move(*exchange));
     return result;
@@ -659,25 +655,25 @@ MapErrors detect_misplaced_or_swapped_lamps(std::span<const Frame> frames, const
     return result;
   }
   const DisplacementTest test(*found, map);
-  result.errors = find_moved_lamps(*found, test);
+  result.errors = collect_moved_lamps(*found, test);
   const double focal_px = calibration.camera.focal_px().mean();
   const double min_offset_m = options.min_offset_px * found->height_m / focal_px;
   std::erase_if(result.errors,
                 [&](const MapError& error) { return error.offset_m.norm() < min_offset_m; });
   constexpr double min_outlier_ratio = 5;
-  auto unsteady = find_lamp_at_varying_position(
-      *found, map, min_outlier_ratio * options.min_offset_px, focal_px);
+  auto unsteady =
+      find_varying_lamp(*found, map, min_outlier_ratio * options.min_offset_px, focal_px);
   const bool is_named = unsteady && std::ranges::any_of(result.errors, [&](const MapError& error) {
                           return error.lamps == unsteady->lamps;
                         });
   if (unsteady && !is_named) result.errors.push_back(std::move(*unsteady));
-  if (result.errors.empty() && is_map_of_other_room(*found)) {
+  if (result.errors.empty() && is_other_room(*found)) {
     result.errors.push_back({MapErrorKind::other_room});
   }
   return result;
 }
 
-std::vector<MapError> find_undetected_lamps(std::span<const Frame> frames, const LampMap& map) {
+std::vector<MapError> list_undetected_lamps(std::span<const Frame> frames, const LampMap& map) {
   std::set<int> seen;
   for (const Frame& frame : frames) {
     for (const Detection& detection : frame.detections) seen.insert(detection.lamp);

@@ -46,7 +46,7 @@ std::string describe_map_error(const MapError& error);
 /// Describes the number of lamps whose map position differs from that in an adjusted calibration
 /// (Positioner::num_lamps_moved_since_calibration()).
 /// @pre lamps >= 1
-std::string describe_lamps_moved_since_calibration(int lamps);
+std::string describe_moved_lamps(int lamps);
 
 /// Describes all errors in one line.
 std::string describe_map_errors(std::span<const MapError> errors);
@@ -60,17 +60,17 @@ struct LampOffset {
   Eigen::Vector2d map_m, offset_m, sd_m;
 };
 
-/// Result of detect_misplaced_or_swapped_lamps().
+/// Result of detect_map_errors().
 struct MapErrors {
   std::vector<MapError> errors;
   /// Horizontal offset of every lamp from its position in the map, including insignificant ones.
   std::vector<LampOffset> offsets;
 
   /// Returns true if the map cannot be used: two lamps are swapped, or it is mirrored.
-  bool is_lamp_map_unusable() const;
+  bool is_map_unusable() const;
 };
 
-/// Options of detect_misplaced_or_swapped_lamps().
+/// Options of detect_map_errors().
 struct MapErrorOptions {
   /// Inclination of the base in each frame; empty: level.
   std::vector<std::optional<Inclination>> inclinations = {};
@@ -89,7 +89,7 @@ struct MapErrorOptions {
 /// @return             no errors if too few captures tie the lamps together
 ///
 /// Tests the displacements x of the lamps in an adjustment with exact lens and heights
-/// (run_bundle_adjustment(), MapPrior::heights), of lamps that two captures contain with two
+/// (adjust_bundle(), MapPrior::heights), of lamps that two captures contain with two
 /// others:
 ///   x = P (d + m) + e
 ///   P  projector onto the displacements that are no similarity of the map
@@ -97,7 +97,7 @@ struct MapErrorOptions {
 ///   m  survey errors: variance sd_m^2 of the lamp plus tau^2, common to all lamps
 ///   e  noise of the captures
 /// tau^2 >= 0 is the smallest value for which the weighted squares chi^2 of x - P d do not exceed
-/// f. Their degrees of freedom are f = count_determined_unknowns(P) - 2 k.
+/// f. Their degrees of freedom are f = count_determined(P) - 2 k.
 ///
 /// Lamps enter d one by one, by the largest drop of chi^2. The result is the largest set in which
 /// no lamp can be replaced by another one with an increase of chi^2 below
@@ -123,11 +123,10 @@ struct MapErrorOptions {
 ///   - Several lamps that are displaced equally can mask each other.
 ///   - If sd_m is smaller than the true errors of the survey, false alarms are more frequent (3 to
 ///     5 % if the errors are twice as large).
-MapErrors detect_misplaced_or_swapped_lamps(std::span<const Frame> frames, const LampMap& map,
-                                            const Calibration& calibration,
-                                            const MapErrorOptions& options = {});
+MapErrors detect_map_errors(std::span<const Frame> frames, const LampMap& map,
+                            const Calibration& calibration, const MapErrorOptions& options = {});
 
 /// Finds the lamps of the map that no frame contains. In a large room this is no error.
-std::vector<MapError> find_undetected_lamps(std::span<const Frame> frames, const LampMap& map);
+std::vector<MapError> list_undetected_lamps(std::span<const Frame> frames, const LampMap& map);
 
 }  // namespace vlp

@@ -41,8 +41,8 @@ Trace collect_lamp_trace(const RotationCaptures& rotation, const RotationFit& ax
 /// smallest eigenvalue of M contains only noise.
 ///
 /// @param noise  standard deviation of a coordinate, in the unit of the points
-bool is_circle_center_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& points,
-                                 double noise) {
+bool is_center_determined(const Circle& circle, const std::vector<Eigen::Vector2d>& points,
+                          double noise) {
   // A standard deviation from M is then about 1 / sqrt(1 - 0.25) = 1.15 times too small.
   constexpr double max_noise_fraction = 0.25;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
@@ -55,7 +55,7 @@ bool is_circle_center_determined(const Circle& circle, const std::vector<Eigen::
     information += (radial - mean) * (radial - mean).transpose();
     tangents += tangent * tangent.transpose();
   }
-  const auto [values, axes] = eigendecompose_symmetric_matrix(information);
+  const auto [values, axes] = eigendecompose(information);
   const double variance = noise * noise / (circle.radius * circle.radius);
   for (Eigen::Index i = 0; i < 2; ++i) {
     const double from_noise = variance * axes.col(i).dot(tangents * axes.col(i));
@@ -82,7 +82,7 @@ HeightCircles fit_circles(const RotationCaptures& rotation, const RotationFit& a
     const Trace trace = collect_lamp_trace(rotation, axis, lamp, height);
     if (trace.points.size() < 3) continue;
     const auto fit = fit_circle(trace.points);
-    if (!fit || !fit->converged || !is_circle_center_determined(fit->circle, trace.points, noise)) {
+    if (!fit || !fit->converged || !is_center_determined(fit->circle, trace.points, noise)) {
       ++result.undetermined;
       continue;
     }
@@ -98,8 +98,8 @@ HeightCircles fit_circles(const RotationCaptures& rotation, const RotationFit& a
 
 }  // namespace
 
-CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotation,
-                                                  const Camera& camera, const RotationFit& axis) {
+CircleCenters fit_circle_centers(const RotationCaptures& rotation, const Camera& camera,
+                                 const RotationFit& axis) {
   assert(rotation.status == RotationStatus::ok);
   CircleCenters result;
   if (!axis.converged) return result;
@@ -132,7 +132,7 @@ CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotati
   }
   result.spread_px = focal_px * std::sqrt(spread / count);
   result.mean.converged = true;
-  result.mean.center = make_rotation_center_from_axis_point(mean, RotationModel::shift, camera);
+  result.mean.center = make_rotation_center(mean, RotationModel::shift, camera);
   result.mean.residual_px = freedom > 0 ? focal_px * std::sqrt(squares / freedom) : 0;
   return result;
 }

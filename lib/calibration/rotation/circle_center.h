@@ -22,7 +22,7 @@ struct LampCircle {
   CircleFit fit;
 };
 
-/// Result of fit_and_average_lamp_circle_centers().
+/// Result of fit_circle_centers().
 struct CircleCenters {
   /// Mean of the circle centers. `residual_px` is the RMS distance of the points from their
   /// circles, with three unknowns per circle.
@@ -53,7 +53,7 @@ struct CircleCenters {
 /// most of its circles are determined.
 ///
 /// Source: Chen and Guan, section 3.1, eq. 9.
-CircleCenters fit_and_average_lamp_circle_centers(const RotationCaptures& rotation,
-                                                  const Camera& camera, const RotationFit& axis);
+CircleCenters fit_circle_centers(const RotationCaptures& rotation, const Camera& camera,
+                                 const RotationFit& axis);
 
 }  // namespace vlp

@@ -21,7 +21,7 @@ namespace {
 /// Smallest number of captures of a pivot.
 constexpr std::size_t kMinCaptures = 3;
 
-RotationStatus find_rotation_status(const std::vector<Frame>& frames, const LampMap& map) {
+RotationStatus select_status(const std::vector<Frame>& frames, const LampMap& map) {
   std::set<int> known, seen;
   for (const Lamp& lamp : map.lamps) known.insert(lamp.id);
   std::size_t captures = 0;
@@ -37,7 +37,7 @@ RotationStatus find_rotation_status(const std::vector<Frame>& frames, const Lamp
 }
 
 /// Returns the reason why there are too few fixes.
-RotationStatus find_rotation_status(const std::vector<FixStatus>& statuses) {
+RotationStatus select_status(const std::vector<FixStatus>& statuses) {
   const auto count = [&](FixStatus status) {
     return std::count(statuses.begin(), statuses.end(), status);
   };
@@ -74,7 +74,7 @@ struct PivotArc {
 /// RotationCaptures for the criterion.
 ///
 /// @param noise_m  standard deviation of the height of a fix
-void cluster_fixes_by_height(PivotFixes& fixes, double noise_m) {
+void cluster_fixes(PivotFixes& fixes, double noise_m) {
   constexpr double clear_sigmas = 3;
   std::vector<std::size_t> order(fixes.fixes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -91,17 +91,17 @@ void cluster_fixes_by_height(PivotFixes& fixes, double noise_m) {
 }
 
 /// Counts the captures of each pivot and computes their angular ranges.
-std::vector<PivotArc> compute_pivot_yaw_arcs(const PivotFixes& fixes) {
+std::vector<PivotArc> list_pivot_arcs(const PivotFixes& fixes) {
   std::vector<std::vector<double>> yaws_rad(fixes.num_pivots);
   for (const RotationFix& fix : fixes.fixes) yaws_rad[fix.pivot].push_back(fix.pose.yaw_rad);
   std::vector<PivotArc> arcs;
   arcs.reserve(fixes.num_pivots);
-  for (const auto& yaws : yaws_rad) arcs.push_back({yaws.size(), compute_angular_coverage(yaws)});
+  for (const auto& yaws : yaws_rad) arcs.push_back({yaws.size(), measure_arc(yaws)});
   return arcs;
 }
 
 /// Returns `ok` if at least one pivot determines a center, otherwise the reason why none does.
-RotationStatus find_rotation_status(const std::vector<PivotArc>& arcs) {
+RotationStatus select_status(const std::vector<PivotArc>& arcs) {
   constexpr double max_equal_yaw_rad = 0.05;
   RotationStatus status = RotationStatus::too_few_captures;
   bool has_rotation = false;
@@ -115,8 +115,8 @@ RotationStatus find_rotation_status(const std::vector<PivotArc>& arcs) {
 }
 
 /// Removes pivots with too few captures or too small an angular range. `arcs` is
-/// compute_pivot_yaw_arcs(fixes).
-void reject_pivots_with_short_arcs(PivotFixes& fixes, const std::vector<PivotArc>& arcs) {
+/// list_pivot_arcs(fixes).
+void reject_short_arcs(PivotFixes& fixes, const std::vector<PivotArc>& arcs) {
   std::vector<std::size_t> new_index(fixes.num_pivots);
   PivotFixes kept;
   kept.num_pivots = 0;
@@ -135,7 +135,7 @@ void reject_pivots_with_short_arcs(PivotFixes& fixes, const std::vector<PivotArc
 }
 
 /// Returns the upper median of the heights of a pivot, as in RotationFix::height_m.
-double compute_median_pivot_height(const PivotFixes& fixes, std::size_t pivot) {
+double compute_pivot_height(const PivotFixes& fixes, std::size_t pivot) {
   std::vector<double> heights_m;
   for (const RotationFix& fix : fixes.fixes) {
     if (fix.pivot == pivot) heights_m.push_back(fix.height_m);
@@ -177,35 +177,33 @@ class RotationSearch {
       // The tolerance is larger while the tilt is not corrected, because lamps contradict each
       // other then.
       locate(iteration < num_rough_iterations ? 0.3 : PositionerOptions().max_residual_fraction);
-      if (fixes_.fixes.size() < kMinCaptures) return find_rotation_status(statuses_);
-      if (iteration >= num_rough_iterations) cluster_fixes_by_height(fixes_, height_noise_m_);
+      if (fixes_.fixes.size() < kMinCaptures) return select_status(statuses_);
+      if (iteration >= num_rough_iterations) cluster_fixes(fixes_, height_noise_m_);
       const bool estimates_arm = iteration < num_rough_iterations && lever_arm_;
-      if (const RotationStatus status = fit_rotation_to_fixes(estimates_arm);
-          status != RotationStatus::ok)
+      if (const RotationStatus status = fit_rotation(estimates_arm); status != RotationStatus::ok)
         return status;
     }
-    if (median_residual_m() > 0.05 * compute_median_pivot_height(fixes_, 0))
+    if (median_residual_m() > 0.05 * compute_pivot_height(fixes_, 0))
       return RotationStatus::axis_moved;
     reject_fix_outliers();
     locate(PositionerOptions().max_residual_fraction);
-    cluster_fixes_by_height(fixes_, height_noise_m_);
-    return fit_rotation_to_fixes(false);
+    cluster_fixes(fixes_, height_noise_m_);
+    return fit_rotation(false);
   }
 
   /// Returns the upper median of the distances of the fixes from their predicted positions, in m.
   double median_residual_m() const { return upper_median(model_fit_.residuals_m); }
-  /// Returns the frame index of each capture in make_rotation_captures().
+  /// Returns the frame index of each capture in make_captures().
   const std::vector<std::size_t>& frame_indices() const { return fixes_.frames; }
   /// Returns the captures without `lamps`, `observations` and `median_sigma_px`.
-  RotationCaptures make_rotation_captures() const {
+  RotationCaptures make_captures() const {
     RotationCaptures pivot;
     pivot.zenith_in_camera = calibration_.rotation_center->zenith_in_camera;
     pivot.lever_arm_m = model_fit_.lever_arm_m;
-    const auto arcs = compute_pivot_yaw_arcs(fixes_);
+    const auto arcs = list_pivot_arcs(fixes_);
     for (std::size_t i = 0; i < fixes_.num_pivots; ++i) {
-      pivot.heights.push_back({lamps_z_m_ - compute_median_pivot_height(fixes_, i),
-                               model_fit_.axes_m[i], arcs[i].arc_rad,
-                               static_cast<int>(arcs[i].captures)});
+      pivot.heights.push_back({lamps_z_m_ - compute_pivot_height(fixes_, i), model_fit_.axes_m[i],
+                               arcs[i].arc_rad, static_cast<int>(arcs[i].captures)});
     }
     for (std::size_t i = 0; i < fixes_.fixes.size(); ++i) {
       const RotationFix& fix = fixes_.fixes[i];
@@ -259,16 +257,16 @@ class RotationSearch {
     return two_lamp_sds_m.empty() ? 0 : upper_median(std::move(two_lamp_sds_m));
   }
 
-  RotationStatus fit_rotation_to_fixes(bool lever_arm) {
-    const auto arcs = compute_pivot_yaw_arcs(fixes_);
-    if (const RotationStatus status = find_rotation_status(arcs); status != RotationStatus::ok)
+  RotationStatus fit_rotation(bool lever_arm) {
+    const auto arcs = list_pivot_arcs(fixes_);
+    if (const RotationStatus status = select_status(arcs); status != RotationStatus::ok)
       return status;
     for (const std::size_t i : fixes_.frames)
       rejection_reasons_[i] = "too few captures, or too small an arc, at its height";
-    reject_pivots_with_short_arcs(fixes_, arcs);
+    reject_short_arcs(fixes_, arcs);
     for (const std::size_t i : fixes_.frames) rejection_reasons_[i].clear();
-    model_fit_ = fit_rotation_model_to_fixes(fixes_.fixes, fixes_.num_pivots,
-                                             lever_arm || fixes_.num_pivots > 1);
+    model_fit_ =
+        fit_rotation_model(fixes_.fixes, fixes_.num_pivots, lever_arm || fixes_.num_pivots > 1);
     const Eigen::Vector3d up(-model_fit_.delta.x(), -model_fit_.delta.y(), 1);
     current_zenith() = (level_rotation_from_zenith(current_zenith()).transpose() * up).normalized();
     // Three captures and a lever arm have no redundancy: noise can move the zenith anywhere.
@@ -282,7 +280,7 @@ class RotationSearch {
 
   void reject_fix_outliers() {
     const double max_residual_m =
-        std::max(8 * median_residual_m(), 0.01 * compute_median_pivot_height(fixes_, 0));
+        std::max(8 * median_residual_m(), 0.01 * compute_pivot_height(fixes_, 0));
     for (std::size_t i = 0; i < fixes_.fixes.size(); ++i) {
       if (!(model_fit_.residuals_m[i] > max_residual_m)) continue;
       outliers_.insert(fixes_.frames[i]);
@@ -304,8 +302,8 @@ class RotationSearch {
   RotationModelFit model_fit_;
 };
 
-void add_observations_of_capture(RotationCaptures& rotation, const Frame& frame,
-                                 std::size_t capture, const Lens& lens) {
+void add_observations(RotationCaptures& rotation, const Frame& frame, std::size_t capture,
+                      const Lens& lens) {
   for (const Detection& detection : frame.detections) {
     const Lamp* lamp = find_lamp_by_id(rotation.lamps, detection.lamp);
     const auto ray = lens.unproject_pixel(detection.pixel);
@@ -331,10 +329,10 @@ std::optional<double> median_sigma_px(const std::vector<Frame>& frames) {
 
 }  // namespace
 
-RotationCaptures find_in_place_rotation_captures(const std::vector<Frame>& frames,
-                                                 const LampMap& map, const Camera& camera) {
+RotationCaptures detect_pivots(const std::vector<Frame>& frames, const LampMap& map,
+                               const Camera& camera) {
   RotationCaptures rotation;
-  rotation.status = find_rotation_status(frames, map);
+  rotation.status = select_status(frames, map);
   if (rotation.status != RotationStatus::ok) return rotation;
   const auto given_px = median_sigma_px(frames);
   const double noise_px = given_px.value_or(1);
@@ -350,7 +348,7 @@ RotationCaptures find_in_place_rotation_captures(const std::vector<Frame>& frame
   if (arm_is_better) rotation.status = RotationStatus::ok;
   if (rotation.status != RotationStatus::ok) return rotation;
   const RotationSearch& search = arm_is_better ? with_arm : without_arm;
-  rotation = search.make_rotation_captures();
+  rotation = search.make_captures();
   rotation.median_sigma_px = given_px;
   std::set<int> seen;
   for (const std::size_t i : search.frame_indices()) {
@@ -361,12 +359,12 @@ RotationCaptures find_in_place_rotation_captures(const std::vector<Frame>& frame
   }
   const Lens lens(camera.lens_model, camera.intrinsics);
   for (std::size_t i = 0; i < search.frame_indices().size(); ++i) {
-    add_observations_of_capture(rotation, frames[search.frame_indices()[i]], i, lens);
+    add_observations(rotation, frames[search.frame_indices()[i]], i, lens);
   }
   return rotation;
 }
 
-std::string_view describe_rotation_status(RotationStatus status) {
+std::string_view describe_status(RotationStatus status) {
   switch (status) {
     case RotationStatus::ok:
       return "captures of a rotation in place";

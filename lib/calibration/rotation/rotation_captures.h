@@ -61,7 +61,7 @@ enum class RotationStatus {
 };
 
 /// Describes the status and the remedy, human-readable.
-std::string_view describe_rotation_status(RotationStatus status);
+std::string_view describe_status(RotationStatus status);
 
 /// Captures of a rotation in place about a vertical axis, with approximate values of the unknowns.
 ///
@@ -110,7 +110,7 @@ inline constexpr double kMinArc_rad = 1.5707963267948966;
 /// Finds the rotation in place in the captures: yaws, heights, axes, and approximate tilt and lever
 /// arm. Members other than `status` are valid only if the status is `ok`.
 /// @pre the number of intrinsics matches the lens model
-RotationCaptures find_in_place_rotation_captures(const std::vector<Frame>& frames,
-                                                 const LampMap& map, const Camera& camera);
+RotationCaptures detect_pivots(const std::vector<Frame>& frames, const LampMap& map,
+                               const Camera& camera);
 
 }  // namespace vlp

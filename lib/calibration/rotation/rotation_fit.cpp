@@ -14,7 +14,7 @@
 namespace vlp {
 namespace {
 
-bool has_lamps_at_several_heights(const RotationCaptures& rotation) {
+bool has_lamp_heights(const RotationCaptures& rotation) {
   const auto [lowest, highest] = std::minmax_element(
       rotation.lamps.begin(), rotation.lamps.end(),
       [](const Lamp& a, const Lamp& b) { return a.position_m.z() < b.position_m.z(); });
@@ -60,8 +60,8 @@ AdjustmentInput make_adjustment_input(const RotationCaptures& rotation, const Ca
 /// Fits the axis with an estimated lever arm, or with a lever arm of zero.
 RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, bool lever_arm) {
   constexpr double no_limit = std::numeric_limits<double>::infinity();
-  const AdjustmentResult adjusted = run_bundle_adjustment(
-      make_adjustment_input(rotation, camera, lever_arm), {no_limit, no_limit});
+  const AdjustmentResult adjusted =
+      adjust_bundle(make_adjustment_input(rotation, camera, lever_arm), {no_limit, no_limit});
   RotationFit result;
   result.converged = adjusted.has_succeeded();
   if (!result.converged) return result;
@@ -86,20 +86,19 @@ RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, boo
 
 }  // namespace
 
-Tilt compute_tilt_from_rotation_center(const RotationCenter& center) {
+Tilt compute_tilt(const RotationCenter& center) {
   const Eigen::Vector3d& up = center.zenith_in_camera;
   return {std::atan2(up.head<2>().norm(), up.z()), std::atan2(up.y(), up.x())};
 }
 
-Eigen::Vector2d undistorted_pixel_from_normalized_point(const Camera& camera,
-                                                        const Eigen::Vector2d& z) {
+Eigen::Vector2d ideal_pixel_from_point(const Camera& camera, const Eigen::Vector2d& z) {
   const Eigen::Vector2d focal_px = camera.focal_px();
   return focal_px.cwiseProduct(z) + camera.principal_point_px();
 }
 
-RotationCenter make_rotation_center_from_axis_point(const Eigen::Vector2d& z, RotationModel model,
-                                                    const Camera& camera) {
-  return {model, undistorted_pixel_from_normalized_point(camera, z), z.homogeneous().normalized()};
+RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel model,
+                                    const Camera& camera) {
+  return {model, ideal_pixel_from_point(camera, z), z.homogeneous().normalized()};
 }
 
 RotationFit fit_rotation_axis(const RotationCaptures& rotation, const Camera& camera) {
@@ -108,7 +107,7 @@ RotationFit fit_rotation_axis(const RotationCaptures& rotation, const Camera& ca
   if (rotation.heights.size() > 1) {
     result = fit_axis(rotation, camera, true);
   } else {
-    if (has_lamps_at_several_heights(rotation)) result = fit_axis(rotation, camera, true);
+    if (has_lamp_heights(rotation)) result = fit_axis(rotation, camera, true);
     if (!determines_lever_arm(result, rotation)) result = fit_axis(rotation, camera, false);
   }
   if (!result.converged) return result;

@@ -45,15 +45,14 @@ struct Tilt {
   double azimuth_rad;
 };
 /// Returns the tilt that the zenith of `center` corresponds to.
-Tilt compute_tilt_from_rotation_center(const RotationCenter& center);
+Tilt compute_tilt(const RotationCenter& center);
 
 /// Returns the pixel f * z + c of a normalized point in the undistorted image.
-Eigen::Vector2d undistorted_pixel_from_normalized_point(const Camera& camera,
-                                                        const Eigen::Vector2d& z);
+Eigen::Vector2d ideal_pixel_from_point(const Camera& camera, const Eigen::Vector2d& z);
 
 /// Returns the rotation center whose axis appears at normalized point z in the camera.
-RotationCenter make_rotation_center_from_axis_point(const Eigen::Vector2d& z, RotationModel model,
-                                                    const Camera& camera);
+RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel model,
+                                    const Camera& camera);
 
 /// Largest standard deviation of a lever arm that lamps at several heights determine, as a fraction
 /// of the lamps' height above the camera. It corresponds to 0.3 degrees of tilt.
@@ -66,7 +65,7 @@ inline constexpr double kMaxLeverArmSdFraction = 0.005;
 ///     undistorted image. Not converged if the RMS residual exceeds 0.007 focal lengths and four
 ///     times RotationCaptures::median_sigma_px: the captures are then no rotation about one axis.
 ///
-/// A preset of run_bundle_adjustment() with an exact lens and MapPrior::heights: minimizes the
+/// A preset of adjust_bundle() with an exact lens and MapPrior::heights: minimizes the
 /// squared distances of the lamps, in the image, from
 ///   project(camera_from_level(zenith) (Rz(-g_k) (p_i - A_h) - e, Z_i - z_h))
 /// over

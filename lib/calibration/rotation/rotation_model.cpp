@@ -12,8 +12,8 @@
 
 namespace vlp {
 
-RotationModelFit fit_rotation_model_to_fixes(std::span<const RotationFix> fixes,
-                                             std::size_t num_pivots, bool lever_arm) {
+RotationModelFit fit_rotation_model(std::span<const RotationFix> fixes, std::size_t num_pivots,
+                                    bool lever_arm) {
   const auto rows = static_cast<Eigen::Index>(2 * fixes.size());
   const auto tilt_column = static_cast<Eigen::Index>(2 * num_pivots);
   Eigen::MatrixXd design = Eigen::MatrixXd::Zero(rows, tilt_column + (lever_arm ? 4 : 2));
@@ -55,7 +55,7 @@ RotationModelFit fit_rotation_model_to_fixes(std::span<const RotationFix> fixes,
   return model_fit;
 }
 
-double compute_angular_coverage(std::vector<double> angles_rad) {
+double measure_arc(std::vector<double> angles_rad) {
   if (angles_rad.size() < 2) return 0;
   constexpr double turn = 2 * std::numbers::pi;
   for (double& angle : angles_rad) angle -= turn * std::floor(angle / turn);

@@ -36,11 +36,11 @@ struct RotationModelFit {
 /// minimum norm.
 ///
 /// @param lever_arm  if false, the lever arm is zero, and delta contains its effect
-RotationModelFit fit_rotation_model_to_fixes(std::span<const RotationFix> fixes,
-                                             std::size_t num_pivots, bool lever_arm);
+RotationModelFit fit_rotation_model(std::span<const RotationFix> fixes, std::size_t num_pivots,
+                                    bool lever_arm);
 
 /// Returns the angular range of the angles: 2 pi minus the largest gap between neighboring angles,
 /// rad. Returns 0 for fewer than two angles.
-double compute_angular_coverage(std::vector<double> angles_rad);
+double measure_arc(std::vector<double> angles_rad);
 
 }  // namespace vlp

@@ -65,8 +65,8 @@ std::vector<AdjustmentCapture> select_captures(std::span<const Frame> frames, co
 
 /// Locates each capture separately, as a stationary camera. Rejects lamps and captures that
 /// contradict the map.
-Placement locate_captures_separately(const std::vector<AdjustmentCapture>& captures, LampMap map,
-                                     const Calibration& calibration) {
+Placement locate_separately(const std::vector<AdjustmentCapture>& captures, LampMap map,
+                            const Calibration& calibration) {
   for (Lamp& lamp : map.lamps) lamp.sd_m.reset();
   const Positioner positioner(map, calibration);
   Placement placement;
@@ -164,14 +164,14 @@ std::string explain_uncertainty(const TiltCalibration& result,
   const double sd_rad = std::sqrt(result.covariance.diagonal().maxCoeff());
   if (!(sd_rad <= options.max_sd_rad)) {
     return "the standard deviation of the tilt would be " +
-           format_significant_digits(deg_from_rad(sd_rad), kDigits) +
+           format_digits(deg_from_rad(sd_rad), kDigits) +
            " degrees: add captures with more lamps, at other positions and yaws";
   }
   for (const auto& lamp : result.corrections) {
     const double sd_m = lamp.sd_m.maxCoeff();
     if (!(sd_m <= options.max_lamp_sd_m)) {
       return "lamp " + std::to_string(lamp.id) + " would have a standard deviation of " +
-             format_significant_digits(1e3 * sd_m, kDigits) +
+             format_digits(1e3 * sd_m, kDigits) +
              " mm: add captures with it, at other positions and yaws, or leave out --refine-map";
     }
   }
@@ -188,13 +188,13 @@ bool all_have_sigma(std::span<const Frame> frames) {
 /// Adjusts the captures that agree with the map. A capture that contradicts the map for a level
 /// camera may agree with it at the zenith that the other captures determine, and is then used.
 /// Iterates until the number of detections is unchanged, at most six times.
-AdjustmentResult adjust_until_detections_agree(const std::vector<AdjustmentCapture>& captures,
-                                               AdjustmentInput& input, TiltCalibration& result) {
+AdjustmentResult adjust_repeatedly(const std::vector<AdjustmentCapture>& captures,
+                                   AdjustmentInput& input, TiltCalibration& result) {
   constexpr int max_iterations = 6;
   constexpr double no_limit = std::numeric_limits<double>::infinity();
   AdjustmentResult found;
   for (int iteration = 0, detections = 0; iteration < max_iterations; ++iteration) {
-    Placement placement = locate_captures_separately(captures, input.lamps, input.calibration);
+    Placement placement = locate_separately(captures, input.lamps, input.calibration);
     result.undetermined =
         explain_undetermined(placement, input.lamps, input.map_prior == MapPrior::frame);
     if (!result.undetermined.empty() || placement.count_detections() == detections) break;
@@ -203,7 +203,7 @@ AdjustmentResult adjust_until_detections_agree(const std::vector<AdjustmentCaptu
       result.residual_before_px = std::sqrt(placement.squares_px2 / placement.degrees_of_freedom());
     }
     input.captures = std::move(placement.captures);
-    found = run_bundle_adjustment(input, {no_limit, no_limit});
+    found = adjust_bundle(input, {no_limit, no_limit});
     if (!found.has_succeeded()) {
       result.undetermined = kUndeterminedMessage;
       break;
@@ -215,9 +215,9 @@ AdjustmentResult adjust_until_detections_agree(const std::vector<AdjustmentCaptu
 
 }  // namespace
 
-TiltCalibration estimate_camera_tilt_from_lamps(std::span<const Frame> frames, const LampMap& map,
-                                                const Camera& camera,
-                                                const TiltCalibrationOptions& options) {
+TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const LampMap& map,
+                                         const Camera& camera,
+                                         const TiltCalibrationOptions& options) {
   TiltCalibration result;
   result.map = map;
   const auto captures = select_captures(frames, map, options.motions, result);
@@ -226,7 +226,7 @@ TiltCalibration estimate_camera_tilt_from_lamps(std::span<const Frame> frames, c
   if (options.refine_map) input.map_prior = MapPrior::frame;
   input.captures_are_checked = true;
   input.weighs_in_undistorted_image = true;
-  const AdjustmentResult found = adjust_until_detections_agree(captures, input, result);
+  const AdjustmentResult found = adjust_repeatedly(captures, input, result);
   result.captures = found.captures;
   result.captures_rejected = static_cast<int>(captures.size()) - found.captures;
   result.detections = found.detections;

@@ -15,7 +15,7 @@
 
 namespace vlp {
 
-/// Options of estimate_camera_tilt_from_lamps().
+/// Options of estimate_tilt_from_lamps().
 struct TiltCalibrationOptions {
   /// If true, also estimates corrections of the lamp map (MapPrior::frame).
   /// Captures at different yaws separate a tilt of all lamps from that of the camera. Captures at
@@ -70,7 +70,7 @@ struct TiltCalibration {
 ///
 /// @return  tilt and optionally map; `undetermined` states the reason if there is none
 ///
-/// Calls run_bundle_adjustment() with an exact lens and without known positions. The map is
+/// Calls adjust_bundle() with an exact lens and without known positions. The map is
 /// weighted by its sd_m, and exact without one. Detections without sigma_px are weighted as in
 /// positioning.
 ///
@@ -83,8 +83,8 @@ struct TiltCalibration {
 ///   - captures that all have the same position and yaw, where an error of the map resembles a tilt
 ///   - with `refine_map`, captures at one yaw, or at one position, or a lamp in one capture only
 ///   - standard deviations above the limits of `options`
-TiltCalibration estimate_camera_tilt_from_lamps(std::span<const Frame> frames, const LampMap& map,
-                                                const Camera& camera,
-                                                const TiltCalibrationOptions& options = {});
+TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const LampMap& map,
+                                         const Camera& camera,
+                                         const TiltCalibrationOptions& options = {});
 
 }  // namespace vlp

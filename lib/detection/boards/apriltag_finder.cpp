@@ -75,11 +75,11 @@ struct Detector {
 class ApriltagFinder : public TagFinder {
  public:
   explicit ApriltagFinder(Board board) : board_(std::move(board)) {
-    return_detector(acquire_idle_detector());
+    return_detector(acquire_detector());
   }
 
   std::vector<TagDetection> detect_tags(const cv::Mat1b& image) const override {
-    std::unique_ptr<Detector> detector = acquire_idle_detector();
+    std::unique_ptr<Detector> detector = acquire_detector();
     detector->detector->quad_decimate = image.cols * image.rows >= kLargePixels ? 2 : 1;
     // The detector does not write to the image, but its interface lacks const.
     image_u8_t view{image.cols, image.rows, static_cast<int>(image.step), image.data};
@@ -102,7 +102,7 @@ class ApriltagFinder : public TagFinder {
  private:
   /// Returns an idle detector, or a new one. A detector serves one thread at a time and is
   /// expensive to create.
-  std::unique_ptr<Detector> acquire_idle_detector() const {
+  std::unique_ptr<Detector> acquire_detector() const {
     {
       const std::lock_guard lock(mutex_);
       if (!idle_.empty()) {
@@ -125,9 +125,9 @@ class ApriltagFinder : public TagFinder {
 
 }  // namespace
 
-void load_tag_family_decoder(const std::string& name) { get_decoding_table(name); }
+void load_tag_family(const std::string& name) { get_decoding_table(name); }
 
-std::unique_ptr<TagFinder> make_apriltag_detector(const Board& board) {
+std::unique_ptr<TagFinder> make_apriltag_finder(const Board& board) {
   return std::make_unique<ApriltagFinder>(board);
 }
 

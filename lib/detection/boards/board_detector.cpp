@@ -64,10 +64,10 @@ std::vector<PointDetection> collect_detected_corners(const BoardDetection& seen)
 BoardDetector::BoardDetector(const Board& board) {
   for (const BoardTag& tag : list_board_tags(board)) ids_.insert(tag.id);
   if (board.kind != BoardKind::chessboard) {
-    const bool aruco = board.corner_squares || board.has_chessboard_squares();
-    finder_ = aruco ? make_aruco_detector(board) : make_apriltag_detector(board);
+    const bool aruco = board.corner_squares || board.has_squares();
+    finder_ = aruco ? make_aruco_detector(board) : make_apriltag_finder(board);
   }
-  if (board.has_chessboard_squares()) {
+  if (board.has_squares()) {
     squares_ = std::make_unique<SquareCorners>(board);
   } else if (board.corner_squares) {
     touching_ = std::make_unique<TouchingTags>(board);
@@ -78,7 +78,7 @@ BoardDetector::BoardDetector(const Board& board) {
 
 BoardDetector::~BoardDetector() = default;
 
-cv::Mat1b scale_image_to_8_bits(const cv::Mat& image) {
+cv::Mat1b scale_to_8_bits(const cv::Mat& image) {
   if (image.depth() == CV_8U) return image;
   double brightest = 0;
   cv::minMaxLoc(image, nullptr, &brightest);
@@ -91,13 +91,13 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
   // Tags are wider, and libapriltag reads out of bounds for images of one or two rows.
   constexpr int min_px = 10;
   if (std::min(image.cols, image.rows) < min_px) return {};
-  const cv::Mat1b levels = scale_image_to_8_bits(image);
+  const cv::Mat1b levels = scale_to_8_bits(image);
   const GrayLevels gray{levels, print_ ? cv::Mat1f() : smooth_image(levels)};
   BoardDetection seen;
   if (!finder_) {
-    seen.points = squares_->detect_chessboard_corners(gray);
+    seen.points = squares_->detect_chessboard(gray);
     if (seen.points.empty()) {
-      seen.largest_chessboard_part = squares_->detect_largest_chessboard_part(levels);
+      seen.largest_chessboard_part = squares_->detect_largest_part(levels);
     }
     return seen;
   }
@@ -112,14 +112,14 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
   if (squares_) {
     seen.num_unusable_tags = static_cast<int>(found.size() - once.size());
     seen.tags = once;
-    seen.points = squares_->detect_corners_near_markers(seen.tags, gray);
+    seen.points = squares_->detect_near_markers(seen.tags, gray);
     return seen;
   }
   if (print_) {
-    seen.curve_costs = refine_tags_by_edge_fits(once, levels, *print_);
+    seen.curve_costs = refine_tags(once, levels, *print_);
     seen.tags = once;
   } else {
-    auto [tags, rejected_predictions] = touching_->refine_and_complete_tags(once, gray);
+    auto [tags, rejected_predictions] = touching_->complete_tags(once, gray);
     seen.tags = std::move(tags);
     std::erase_if(seen.tags, [&](const TagDetection& tag) {
       return found.contains(tag.id) && found.at(tag.id).size() > 1;

@@ -27,9 +27,7 @@ class SquareCorners;
 struct EdgeCurvature {
   double quadratic_px = 0, cubic_px = 0, reach = 0;
 
-  double curve_offset_from_straight_line_px(double w) const {
-    return (w * w - 1) * (quadratic_px + cubic_px * w);
-  }
+  double curve_offset_px(double w) const { return (w * w - 1) * (quadratic_px + cubic_px * w); }
   bool operator==(const EdgeCurvature&) const = default;
 };
 
@@ -72,7 +70,7 @@ struct TagDetection {
   Corners corners_px;
   Curvatures curvatures = {};
   CornerSds corner_sds_px = {};
-  /// Fits for the tone curves of kGammas above 1, one each, until correct_views_for_tone_curve()
+  /// Fits for the tone curves of kGammas above 1, one each, until correct_views()
   /// applies a curve. Empty for an image that certainly has no tone curve.
   std::vector<Outline> tone_curve_fits = {};
   Steps steps = {};
@@ -82,11 +80,11 @@ struct TagDetection {
 struct PointDetection {
   /// Index of the point on the board. Boards of squares: row by row from the top left, as OpenCV
   /// counts the corners of a ChArUco board. Boards of AprilTags, whose points come from a file: as
-  /// BoardLattice::point_index_on_board().
+  /// BoardLattice::board_point_index().
   std::size_t index;
   Eigen::Vector2d pixel;
   /// Standard deviation, px, averaged over all directions: TagDetection::corner_sds_px, or of
-  /// fit_edge_intersection_at_corner(); 0 if unknown.
+  /// fit_edge_crossing(); 0 if unknown.
   double sd_px = 0;
   /// Factor by which a solve multiplies the residual of the point.
   double weight = 1;
@@ -114,11 +112,11 @@ struct BoardDetection {
   std::array<int, 2> largest_chessboard_part = {0, 0};
   /// Negative log-likelihood of the edges of tags for the tone curves of kGammas, up to a constant.
   /// Only the first two if the image certainly has no tone curve. Empty if no edges are fitted, or
-  /// after correct_views_for_tone_curve().
+  /// after correct_views().
   std::vector<double> curve_costs = {};
 
   /// Returns true if a tag or a point was detected.
-  bool has_detected_corners() const { return !tags.empty() || !points.empty(); }
+  bool has_corners() const { return !tags.empty() || !points.empty(); }
 };
 
 /// Image with the detection of a board.
@@ -135,23 +133,23 @@ std::vector<PointDetection> collect_detected_corners(const BoardDetection& seen)
 
 /// Converts an image to gray levels of 8 bits. 16-bit images are scaled so that their brightest
 /// pixel has level 255.
-cv::Mat1b scale_image_to_8_bits(const cv::Mat& image);
+cv::Mat1b scale_to_8_bits(const cv::Mat& image);
 
 /// Creates the decoding table of a tag family, which every detection of its tags needs (20 ms for
 /// tag36h11). A process that calls it before it forks shares the table with its children.
 /// @throws std::invalid_argument if there is no such family
-void load_tag_family_decoder(const std::string& name);
+void load_tag_family(const std::string& name);
 
 /// Detector of a board's tags, or of the corners of its squares (SquareCorners). Safe to share
 /// between threads.
 ///
 /// AprilTags without corner squares are detected by libapriltag. The gap between tags has to be
-/// white. Corners are the intersections of the tag's edges (refine_tags_by_edge_fits()), or
+/// white. Corners are the intersections of the tag's edges (refine_tags()), or
 /// libapriltag's if their fit fails.
 ///
 /// AprilTags with corner squares, which touch each other, are detected by OpenCV's ArUco module.
 /// Missing tags are then predicted from their neighbors. Corners are the intersections of the
-/// squares' edges (fit_edge_intersection_at_corner()).
+/// squares' edges (fit_edge_crossing()).
 class BoardDetector {
  public:
   /// Creates the detector of a board.

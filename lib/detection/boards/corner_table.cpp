@@ -50,23 +50,23 @@ constexpr std::array kBowColumns{"edge_quadratic_px", "edge_cubic_px", "edge_hal
 EdgeCurvature read_curvature(const CsvTable& csv, std::size_t row) {
   constexpr double min_reach = 0.01, max_reach = 2;
   if (std::ranges::none_of(kBowColumns,
-                           [&](auto name) { return csv.get_optional_column(name).has_value(); }))
+                           [&](auto name) { return csv.find_column(name).has_value(); }))
     return {};
-  const auto reach_at = csv.get_required_column(kBowColumns[2]);
+  const auto reach_at = csv.require_column(kBowColumns[2]);
   const double reach = csv.get_cell_number(row, reach_at);
   if (reach != 0 && !(reach >= min_reach && reach <= max_reach)) {
     throw csv.make_cell_error(
         row, reach_at,
         "should be the half extent of the edge pixels, 0.01 to 2, or 0 if there are none");
   }
-  return {csv.get_cell_number(row, csv.get_required_column(kBowColumns[0])),
-          csv.get_cell_number(row, csv.get_required_column(kBowColumns[1])), reach};
+  return {csv.get_cell_number(row, csv.require_column(kBowColumns[0])),
+          csv.get_cell_number(row, csv.require_column(kBowColumns[1])), reach};
 }
 
 constexpr const char* kDeviationColumn = "sd_px";
 
 double read_sd_px(const CsvTable& csv, std::size_t row) {
-  const auto column = csv.get_optional_column(kDeviationColumn);
+  const auto column = csv.find_column(kDeviationColumn);
   if (!column) return 0;
   const double sd_px = csv.get_cell_number(row, *column);
   if (sd_px < 0) {
@@ -76,7 +76,7 @@ double read_sd_px(const CsvTable& csv, std::size_t row) {
 }
 
 /// Describes a row length that contradicts board.yaml; empty if the points lie in rows as expected.
-std::string describe_wrong_rows(const Board& board, std::span<const BoardView> views) {
+std::string describe_rows(const Board& board, std::span<const BoardView> views) {
   const auto cols = static_cast<std::size_t>(board.cols - 1),
              rows = static_cast<std::size_t>(board.rows - 1);
   std::vector<LatticePixels> pixels;
@@ -85,7 +85,7 @@ std::string describe_wrong_rows(const Board& board, std::span<const BoardView> v
     for (const PointDetection& point : view.detection.points)
       pixels.back()[point.index] = point.pixel;
   }
-  const std::size_t row_length = estimate_points_per_lattice_row(pixels, cols);
+  const std::size_t row_length = estimate_points_per_row(pixels, cols);
   if (row_length == cols) return "";
   return fmt::format(
       "the corners lie in rows of {}, but a board of {} x {} squares has {} x {} corners; {}",
@@ -95,8 +95,7 @@ std::string describe_wrong_rows(const Board& board, std::span<const BoardView> v
 
 }  // namespace
 
-std::string describe_corner_outside_image(const Eigen::Vector2d& pixel,
-                                          const std::array<int, 2>& imager_px) {
+std::string describe_outside(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px) {
   constexpr double edge = 0.5;  // half a pixel
   const auto [width, height] = imager_px;
   if (pixel.x() >= -edge && pixel.y() >= -edge && pixel.x() <= width - edge &&
@@ -105,11 +104,10 @@ std::string describe_corner_outside_image(const Eigen::Vector2d& pixel,
   }
   return fmt::format(
       "a corner at ({}, {}) is outside an image of {} x {} px; is it of this camera?",
-      format_shortest_exact_number(pixel.x()), format_shortest_exact_number(pixel.y()), width,
-      height);
+      format_exact_number(pixel.x()), format_exact_number(pixel.y()), width, height);
 }
 
-bool are_too_many_corners_outside_image(std::size_t outside, std::size_t corners) {
+bool are_too_many_outside(std::size_t outside, std::size_t corners) {
   constexpr std::size_t one_of = 50;
   return one_of * outside > corners;
 }
@@ -125,18 +123,18 @@ class CornerTableReader {
         csv_(file),
         board_(board),
         imager_px_(imager_px),
-        image_(csv_.get_required_column("image")),
-        number_(csv_.get_required_column("corner")),
-        u_px_(csv_.get_required_column("u_px")),
-        v_px_(csv_.get_required_column("v_px")),
-        tag_id_(board.has_chessboard_squares() ? number_ : csv_.get_required_column("tag")) {}
+        image_(csv_.require_column("image")),
+        number_(csv_.require_column("corner")),
+        u_px_(csv_.require_column("u_px")),
+        v_px_(csv_.require_column("v_px")),
+        tag_id_(board.has_squares() ? number_ : csv_.require_column("tag")) {}
 
   /// Returns the corners of all images. Throws InputError if there are none, or if too many of them
   /// are outside the image.
   std::vector<BoardView> read() {
     for (std::size_t row = 0; row < csv_.num_rows(); ++row) read_row(row);
     if (views_.empty()) throw InputError(file_, "contains no corner");
-    if (are_too_many_corners_outside_image(outside_, corners_)) throw InputError(*first_outside_);
+    if (are_too_many_outside(outside_, corners_)) throw InputError(*first_outside_);
     return std::move(views_);
   }
 
@@ -153,7 +151,7 @@ class CornerTableReader {
     }
     const Eigen::Vector2d pixel(csv_.get_cell_number(row, u_px_), csv_.get_cell_number(row, v_px_));
     ++corners_;
-    if (const auto words = describe_corner_outside_image(pixel, imager_px_); !words.empty()) {
+    if (const auto words = describe_outside(pixel, imager_px_); !words.empty()) {
       if (outside_++ == 0) first_outside_ = csv_.make_cell_error(row, u_px_, words);
     }
     const int corner = read_number(row);
@@ -165,22 +163,20 @@ class CornerTableReader {
 
   /// Reads the number of a corner in its tag, or on its board of squares.
   int read_number(std::size_t row) const {
-    const int last =
-        board_.has_chessboard_squares() ? (board_.cols - 1) * (board_.rows - 1) - 1 : 3;
+    const int last = board_.has_squares() ? (board_.cols - 1) * (board_.rows - 1) - 1 : 3;
     const int corner = csv_.get_cell_integer(row, number_);
     if (corner >= 0 && corner <= last) return corner;
     throw csv_.make_cell_error(
         row, number_,
-        board_.has_chessboard_squares()
-            ? fmt::format("should be within 0 and {}, as on a board of {} x {} "
-                          "squares; is board.yaml that of the board?",
-                          last, board_.cols, board_.rows)
-            : "should be within 0 and 3");
+        board_.has_squares() ? fmt::format("should be within 0 and {}, as on a board of {} x {} "
+                                           "squares; is board.yaml that of the board?",
+                                           last, board_.cols, board_.rows)
+                             : "should be within 0 and 3");
   }
 
   /// Adds a corner to those of its image. Returns false if the image has it already.
   bool add(std::size_t row, int corner, const Eigen::Vector2d& pixel, BoardDetection& seen) {
-    if (board_.has_chessboard_squares()) {
+    if (board_.has_squares()) {
       const auto index = static_cast<std::size_t>(corner);
       const bool is_new =
           std::ranges::find(seen.points, index, &PointDetection::index) == seen.points.end();
@@ -214,24 +210,24 @@ class CornerTableReader {
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px) {
   std::vector<BoardView> views = CornerTableReader(file, board, imager_px).read();
-  if (board.has_chessboard_squares()) {
-    if (const auto words = describe_wrong_rows(board, views); !words.empty())
+  if (board.has_squares()) {
+    if (const auto words = describe_rows(board, views); !words.empty())
       throw InputError(file, words);
   }
   std::set<int> ids;
   for (const BoardTag& tag : list_board_tags(board)) ids.insert(tag.id);
   for (BoardView& view : views) {
     complete_detection(view.detection, ids);
-    if (!board.has_chessboard_squares()) continue;
-    renumber_lattice_points(view.detection.points, board.cols - 1, board.rows - 1,
-                            board.kind == BoardKind::chessboard);
+    if (!board.has_squares()) continue;
+    renumber_lattice(view.detection.points, board.cols - 1, board.rows - 1,
+                     board.kind == BoardKind::chessboard);
   }
   return views;
 }
 
 void write_corner_table(const std::filesystem::path& file, std::span<const BoardView> views,
                         const Board& board) {
-  const bool squares = board.has_chessboard_squares();
+  const bool squares = board.has_squares();
   std::vector<std::string> header{"image", "tag", "corner", "u_px", "v_px"};
   if (squares) {
     header.erase(header.begin() + 1);
@@ -250,9 +246,8 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
     if (squares) {
       for (const PointDetection& point : seen.points) {
         csv.write_csv_row({view.image, std::to_string(point.index),
-                           format_shortest_exact_number(point.pixel.x()),
-                           format_shortest_exact_number(point.pixel.y()),
-                           format_shortest_exact_number(point.sd_px)});
+                           format_exact_number(point.pixel.x()),
+                           format_exact_number(point.pixel.y()), format_exact_number(point.sd_px)});
       }
       continue;
     }
@@ -260,12 +255,12 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
       for (const TagDetection& tag : *each) {
         for (std::size_t k = 0; k < 4; ++k) {
           csv.write_csv_row({view.image, std::to_string(tag.id), std::to_string(k),
-                             format_shortest_exact_number(tag.corners_px[k].x()),
-                             format_shortest_exact_number(tag.corners_px[k].y()),
-                             format_shortest_exact_number(tag.curvatures[k].quadratic_px),
-                             format_shortest_exact_number(tag.curvatures[k].cubic_px),
-                             format_shortest_exact_number(tag.curvatures[k].reach),
-                             format_shortest_exact_number(tag.corner_sds_px[k])});
+                             format_exact_number(tag.corners_px[k].x()),
+                             format_exact_number(tag.corners_px[k].y()),
+                             format_exact_number(tag.curvatures[k].quadratic_px),
+                             format_exact_number(tag.curvatures[k].cubic_px),
+                             format_exact_number(tag.curvatures[k].reach),
+                             format_exact_number(tag.corner_sds_px[k])});
         }
       }
     }

@@ -20,14 +20,14 @@ namespace vlp {
 ///   edge_half_extent                       optional: EdgeCurvature from this corner to the next
 /// Columns for boards of squares:
 ///   image, corner, u_px, v_px              corner as in PointDetection::index; rows may also
-///                                          be counted upwards (renumber_lattice_points())
+///                                          be counted upwards (renumber_lattice())
 /// Column for both:
 ///   sd_px                                  optional: PointDetection::sd_px
 /// An image without corners has one row with its name only. Tags without all four corners are
 /// rejected. Tags that the board does not have are BoardDetection::foreign_tags.
 ///
 /// @throws InputError with file and line, also for a repeated corner, and if too many corners are
-///         outside the image (are_too_many_corners_outside_image())
+///         outside the image (are_too_many_outside())
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px);
 
@@ -38,11 +38,10 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
                         const Board& board);
 
 /// Describes that a corner is outside the image; empty if it is inside.
-std::string describe_corner_outside_image(const Eigen::Vector2d& pixel,
-                                          const std::array<int, 2>& imager_px);
+std::string describe_outside(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px);
 
 /// Returns true if more than 2 % of the corners are outside the image. Fewer may be outliers; more
 /// indicate an image of another size.
-bool are_too_many_corners_outside_image(std::size_t outside, std::size_t corners);
+bool are_too_many_outside(std::size_t outside, std::size_t corners);
 
 }  // namespace vlp

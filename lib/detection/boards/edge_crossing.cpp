@@ -155,9 +155,8 @@ struct Crossing {
   }
 };
 
-std::vector<CrossingPixel> collect_pixels_near_corner(const cv::Mat1b& image,
-                                                      const Eigen::Vector2d& guess_px,
-                                                      double radius_px) {
+std::vector<CrossingPixel> collect_pixels(const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
+                                          double radius_px) {
   const Eigen::Vector2i roi_min = (guess_px.array() - radius_px).ceil().cast<int>().max(0);
   const Eigen::Vector2i roi_max = (guess_px.array() + radius_px)
                                       .floor()
@@ -239,9 +238,10 @@ std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
   }
 }
 
-std::optional<FittedCorner> fit_edge_intersection_at_corner(
-    const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
-    const std::array<Eigen::Vector2d, 2>& along, double radius_px) {
+std::optional<FittedCorner> fit_edge_crossing(const cv::Mat1b& image,
+                                              const Eigen::Vector2d& guess_px,
+                                              const std::array<Eigen::Vector2d, 2>& along,
+                                              double radius_px) {
   constexpr std::size_t min_pixels = 16;
   constexpr int max_iterations = 15;
   constexpr double min_initial_blur_px = 0.8, initial_blur_to_radius_ratio = 0.1;
@@ -251,7 +251,7 @@ std::optional<FittedCorner> fit_edge_intersection_at_corner(
   constexpr double min_contrast = 3, max_relative_rms = 0.22, max_sagitta_fraction = 0.5,
                    max_sd_px = 0.5;
   constexpr double max_growth_fraction = 0.17;
-  const auto pixels = collect_pixels_near_corner(image, guess_px, radius_px);
+  const auto pixels = collect_pixels(image, guess_px, radius_px);
   if (pixels.size() < min_pixels) return {};
   Crossing::Parameters p = Crossing::Parameters::Zero();
   p[2] = std::atan2(along[0].y(), along[0].x());

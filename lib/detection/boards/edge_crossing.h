@@ -32,7 +32,7 @@ std::optional<Eigen::Vector2d> find_saddle_point(const cv::Mat1f& smoothed,
                                                  const Eigen::Vector2d& guess_px, int reach_px,
                                                  int radius_px);
 
-/// Corner of fit_edge_intersection_at_corner().
+/// Corner of fit_edge_crossing().
 struct FittedCorner {
   Eigen::Vector2d pixel;
   /// Standard deviation, px, averaged over all directions: from the residuals of the fit, and the
@@ -60,8 +60,9 @@ struct FittedCorner {
 ///   light   gradient of the illumination (vignetting), which would bias a fit without it
 /// On rendered boards the corner is accurate to 0.01 px, a sixth of the error of
 /// find_saddle_point().
-std::optional<FittedCorner> fit_edge_intersection_at_corner(
-    const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
-    const std::array<Eigen::Vector2d, 2>& along, double radius_px);
+std::optional<FittedCorner> fit_edge_crossing(const cv::Mat1b& image,
+                                              const Eigen::Vector2d& guess_px,
+                                              const std::array<Eigen::Vector2d, 2>& along,
+                                              double radius_px);
 
 }  // namespace vlp

@@ -29,7 +29,7 @@ EdgeField::EdgeField(std::span<const EdgeSample> samples, Terms terms) {
     std::vector<double> residuals, magnitudes, variances;
     for (std::size_t i = 0; i < samples.size(); ++i) {
       residuals.push_back(
-          logs[i] - model_terms_at_edge(samples[i].at_px, samples[i].along).dot(coefficients_));
+          logs[i] - make_terms_at_edge(samples[i].at_px, samples[i].along).dot(coefficients_));
       magnitudes.push_back(std::abs(residuals.back()));
       variances.push_back(samples[i].sd * samples[i].sd);
     }
@@ -46,19 +46,19 @@ EdgeField::EdgeField(std::span<const EdgeSample> samples, Terms terms) {
       const double weight =
           std::min(1.0, huber_threshold / std::max(sigmas, huber_threshold)) / variance;
       const Eigen::VectorXd terms_row =
-          model_terms_at_edge(samples[i].at_px, samples[i].along).head(terms_).transpose();
+          make_terms_at_edge(samples[i].at_px, samples[i].along).head(terms_).transpose();
       normal.noalias() += weight * terms_row * terms_row.transpose();
       right += weight * residuals[i] * terms_row;
     }
     normal.diagonal().array() *= 1 + 1e-9;
-    const Eigen::VectorXd step = solve_symmetric_system(normal, right);
+    const Eigen::VectorXd step = solve_symmetric(normal, right);
     if (!step.allFinite()) break;
     coefficients_.head(terms_) += step;
   }
 }
 
-EdgeField::Row EdgeField::model_terms_at_edge(const Eigen::Vector2d& at_px,
-                                              const Eigen::Vector2d& along) const {
+EdgeField::Row EdgeField::make_terms_at_edge(const Eigen::Vector2d& at_px,
+                                             const Eigen::Vector2d& along) const {
   const Eigen::Vector2d x = (at_px - middle_px_) / reach_px_;
   const double square = along.x() * along.x() - along.y() * along.y();
   Row row;
@@ -68,9 +68,9 @@ EdgeField::Row EdgeField::model_terms_at_edge(const Eigen::Vector2d& at_px,
   return row;
 }
 
-double EdgeField::evaluate_field_at_edge(const Eigen::Vector2d& at_px,
-                                         const Eigen::Vector2d& along) const {
-  return std::exp(model_terms_at_edge(at_px, along).dot(coefficients_));
+double EdgeField::evaluate_at_edge(const Eigen::Vector2d& at_px,
+                                   const Eigen::Vector2d& along) const {
+  return std::exp(make_terms_at_edge(at_px, along).dot(coefficients_));
 }
 
 }  // namespace vlp

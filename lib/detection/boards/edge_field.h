@@ -30,15 +30,15 @@ class EdgeField {
   /// @pre There is at least one sample.
   EdgeField(std::span<const EdgeSample> samples, Terms terms);
 
-  double evaluate_field_at_edge(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
+  double evaluate_at_edge(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
   /// Relative standard deviation of the edges from the model that exceeds their own standard
   /// deviations.
-  double excess_relative_sd_of_edges() const { return excess_sd_; }
+  double edge_scatter_beyond_fit_sd() const { return excess_sd_; }
 
  private:
   static constexpr Eigen::Index kMaxTerms = 8;
   using Row = Eigen::Matrix<double, 1, kMaxTerms>;
-  Row model_terms_at_edge(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
+  Row make_terms_at_edge(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
 
   Eigen::Vector2d middle_px_{0, 0};
   double reach_px_ = 1;

@@ -32,7 +32,7 @@ struct EncodedLevel {
   double level, slope;
 };
 
-double convert_level_to_light(double level, double gamma) {
+double convert_to_light(double level, double gamma) {
   return gamma == 1 ? level : kWhite * std::pow(level / kWhite, gamma);
 }
 
@@ -174,7 +174,7 @@ class Edge {
   /// Returns the sigma of the Gaussian with the MTF50 of the step. One Gauss-Newton step first
   /// estimates the excess kurtosis of the line spread (BlurredStep). That of a disc is -1, that of
   /// a Gaussian 0; it stays near 0 if the pixels do not determine it.
-  double compute_equivalent_blur(const Parameters& p, const Equations& equations) const {
+  double compute_blur(const Parameters& p, const Equations& equations) const {
     constexpr double kurtosis_sd = 0.5, min_noise = 0.3;  // in levels: that of rounding
     constexpr double min_kurtosis = -1.5, max_kurtosis = 3;
     // A larger change of the blur, as a fraction of it, is not linear: the Gaussian's blur remains.
@@ -215,7 +215,7 @@ class Edge {
 
 /// Returns EdgeFit::end_variance: the mean variance of both ends with a known curvature.
 template <int parameters>
-double compute_variance_at_edge_end(const EdgeEquations<parameters>& equations) {
+double compute_end_variance(const EdgeEquations<parameters>& equations) {
   constexpr int straight = 7;
   using Square = Eigen::Matrix<double, straight, straight>;
   const Square inverse = Square(equations.normal.template topLeftCorner<straight, straight>())
@@ -291,8 +291,8 @@ struct EdgeSides {
     constexpr double white = 254;
     double ins = 0, outs = 0, whites_in = 0, whites_out = 0;
     for (const EdgePixel& pixel : pixels) {
-      const bool inside = pixel.across_px < edge.curve_offset_from_straight_line_px(pixel.along);
-      (inside ? in : out) += convert_level_to_light(pixel.level, gamma);
+      const bool inside = pixel.across_px < edge.curve_offset_px(pixel.along);
+      (inside ? in : out) += convert_to_light(pixel.level, gamma);
       (inside ? ins : outs) += 1;
       if (pixel.level >= white) (inside ? whites_in : whites_out) += 1;
     }
@@ -313,7 +313,7 @@ EdgeLight make_initial_light(const EdgeSides& sides, double gamma) {
 EdgeLight convert_light(const EdgeLight& light, double gamma) {
   if (gamma == light.gamma) return light;
   const auto convert = [&](double side) {
-    return convert_level_to_light(EncodedLevel(side, light.gamma).level, gamma);
+    return convert_to_light(EncodedLevel(side, light.gamma).level, gamma);
   };
   const double in = convert(light.middle - light.contrast),
                out = convert(light.middle + light.contrast);
@@ -360,8 +360,8 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   const bool is_accepted = p.allFinite() && p[0] > min_blur_px && p[0] < max_blur_px &&
                            contrast > min_contrast && rms < max_relative_rms * contrast;
   if (!is_accepted) return {};
-  result.end_variance = compute_variance_at_edge_end(equations);
-  result.equivalent_blur_px = model.compute_equivalent_blur(p, equations);
+  result.end_variance = compute_end_variance(equations);
+  result.equivalent_blur_px = model.compute_blur(p, equations);
   if (is_saturated || prior.gamma != 1) {
     const auto factor = equations.normal.ldlt();
     Parameters brighter = Parameters::Zero();
@@ -375,30 +375,28 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
 
 }  // namespace
 
-Eigen::Vector2d EdgeCurve::compute_gradient_of_curve_distance_wrt_pixel(
-    const Eigen::Vector2d& x) const {
+Eigen::Vector2d EdgeCurve::compute_distance_gradient(const Eigen::Vector2d& x) const {
   const double w = along.dot(x - middle) / half_length_px;
   const Coefficients& c = coefficients;
   const double slope = c[1] + w * (2 * c[2] + w * 3 * c[3]);
   return across - slope / half_length_px * along;
 }
 
-Eigen::Vector2d find_edge_intersection(const EdgeCurve& a, const EdgeCurve& b,
-                                       Eigen::Vector2d point) {
+Eigen::Vector2d intersect_edge_curves(const EdgeCurve& a, const EdgeCurve& b,
+                                      Eigen::Vector2d point) {
   constexpr int steps = 4;
   for (int i = 0; i < steps; ++i) {
     Eigen::Matrix2d gradients;
-    gradients << a.compute_gradient_of_curve_distance_wrt_pixel(point).transpose(),
-        b.compute_gradient_of_curve_distance_wrt_pixel(point).transpose();
-    point -= gradients.inverse() *
-             Eigen::Vector2d(a.distance_from_curve_px(point), b.distance_from_curve_px(point));
+    gradients << a.compute_distance_gradient(point).transpose(),
+        b.compute_distance_gradient(point).transpose();
+    point -= gradients.inverse() * Eigen::Vector2d(a.signed_distance_outwards_px(point),
+                                                   b.signed_distance_outwards_px(point));
   }
   return point;
 }
 
-std::optional<EdgeFit> fit_edge_curve_and_blur(EdgeCurve& edge,
-                                               const std::vector<EdgePixel>& pixels,
-                                               const EdgePrior& prior, const EdgeFit* previous) {
+std::optional<EdgeFit> fit_edge_curve(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
+                                      const EdgePrior& prior, const EdgeFit* previous) {
   constexpr std::size_t min_pixels = 24;
   if (pixels.size() < min_pixels) return {};
   return edge.cubic ? fit<EdgeCurve::kMaxTerms>(edge, pixels, prior, previous)

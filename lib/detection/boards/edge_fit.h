@@ -33,23 +33,22 @@ struct EdgeCurve {
   bool cubic = false;
   double blur_px = 0.8;
 
-  double curve_offset_from_straight_line_px(double w) const {
+  double curve_offset_px(double w) const {
     const Coefficients& c = coefficients;
     return c[0] + w * (c[1] + w * (c[2] + w * c[3]));
   }
   /// Returns the distance of a point from the curve in px along v, positive outwards.
-  double distance_from_curve_px(const Eigen::Vector2d& x) const {
-    return across.dot(x - middle) -
-           curve_offset_from_straight_line_px(along.dot(x - middle) / half_length_px);
+  double signed_distance_outwards_px(const Eigen::Vector2d& x) const {
+    return across.dot(x - middle) - curve_offset_px(along.dot(x - middle) / half_length_px);
   }
-  /// Returns the gradient of distance_from_curve_px() with respect to the pixel (u, v);
+  /// Returns the gradient of signed_distance_outwards_px() with respect to the pixel (u, v);
   /// dimensionless.
-  Eigen::Vector2d compute_gradient_of_curve_distance_wrt_pixel(const Eigen::Vector2d& x) const;
+  Eigen::Vector2d compute_distance_gradient(const Eigen::Vector2d& x) const;
 };
 
 /// Computes the intersection of two curves by Newton's method from a nearby point.
-Eigen::Vector2d find_edge_intersection(const EdgeCurve& a, const EdgeCurve& b,
-                                       Eigen::Vector2d point);
+Eigen::Vector2d intersect_edge_curves(const EdgeCurve& a, const EdgeCurve& b,
+                                      Eigen::Vector2d point);
 
 /// Prior for the fit of an edge: tone curve, and expected blur and light.
 struct EdgePrior {
@@ -67,7 +66,7 @@ struct EdgeLight {
   Eigen::Vector2d slope = Eigen::Vector2d::Zero();
 };
 
-/// Result of fit_edge_curve_and_blur().
+/// Result of fit_edge_curve().
 struct EdgeFit {
   /// Sum of the squared residuals, in gray levels squared.
   double sum_of_squares;
@@ -104,9 +103,7 @@ struct EdgeFit {
 /// The edge is saturated if at least 25 % of the pixels on the brighter side are white. Levels
 /// above 250 are then censored: residuals use min(level, 250), because the processing of a camera
 /// leaves some saturated pixels below 255.
-std::optional<EdgeFit> fit_edge_curve_and_blur(EdgeCurve& edge,
-                                               const std::vector<EdgePixel>& pixels,
-                                               const EdgePrior& prior,
-                                               const EdgeFit* previous = nullptr);
+std::optional<EdgeFit> fit_edge_curve(EdgeCurve& edge, const std::vector<EdgePixel>& pixels,
+                                      const EdgePrior& prior, const EdgeFit* previous = nullptr);
 
 }  // namespace vlp

@@ -14,8 +14,8 @@ struct Node {
 };
 
 /// Returns the mean displacement in the image to the next point along a row and along a column.
-std::array<Eigen::Vector2d, 2> find_axis_directions(const std::vector<PointDetection>& points,
-                                                    std::size_t cols) {
+std::array<Eigen::Vector2d, 2> compute_axis_directions(const std::vector<PointDetection>& points,
+                                                       std::size_t cols) {
   std::array<Eigen::Vector2d, 2> sums{Eigen::Vector2d::Zero(), Eigen::Vector2d::Zero()};
   std::array<double, 2> counts{1e-9, 1e-9};
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -45,7 +45,7 @@ void renumber_points(std::vector<PointDetection>& points, int cols, const Change
 
 /// Returns the mean length of the second differences along rows of `row` points, in px; NaN if
 /// there are none.
-double compute_row_unevenness_px(std::span<const LatticePixels> images, std::size_t row) {
+double compute_unevenness_px(std::span<const LatticePixels> images, std::size_t row) {
   double sum_px = 0, count = 0;
   for (const LatticePixels& points : images) {
     for (std::size_t i = 2; i < points.size(); ++i) {
@@ -59,29 +59,28 @@ double compute_row_unevenness_px(std::span<const LatticePixels> images, std::siz
 
 }  // namespace
 
-void renumber_lattice_points(std::vector<PointDetection>& points, int cols, int rows,
-                             bool has_180_degree_symmetry) {
+void renumber_lattice(std::vector<PointDetection>& points, int cols, int rows,
+                      bool has_180_degree_symmetry) {
   const auto width = static_cast<std::size_t>(cols);
-  const auto [right, down] = find_axis_directions(points, width);
+  const auto [right, down] = compute_axis_directions(points, width);
   if (right.x() * down.y() - right.y() * down.x() < 0) {
     renumber_points(points, cols, [&](Node node) { return Node{node.col, rows - 1 - node.row}; });
   }
   if (!has_180_degree_symmetry) return;
   if (cols == rows) {
-    const auto [x, y] = find_axis_directions(points, width);
+    const auto [x, y] = compute_axis_directions(points, width);
     if (std::abs(y.x()) > std::abs(x.x())) {
       renumber_points(points, cols, [&](Node node) { return Node{node.row, rows - 1 - node.col}; });
     }
   }
-  if (find_axis_directions(points, width)[0].x() < 0) {
+  if (compute_axis_directions(points, width)[0].x() < 0) {
     renumber_points(points, cols, [&](Node node) {
       return Node{cols - 1 - node.col, rows - 1 - node.row};
     });
   }
 }
 
-std::size_t estimate_points_per_lattice_row(std::span<const LatticePixels> images,
-                                            std::size_t stated) {
+std::size_t estimate_points_per_row(std::span<const LatticePixels> images, std::size_t stated) {
   constexpr double max_ratio = 0.5;
   if (images.empty()) return stated;
   const std::size_t points = images.front().size();
@@ -90,12 +89,12 @@ std::size_t estimate_points_per_lattice_row(std::span<const LatticePixels> image
   // Longer rows are tried first, because a part of a row is as even as the row.
   for (std::size_t row = points / 3; row >= 3; --row) {
     if (points % row != 0) continue;
-    const double px = compute_row_unevenness_px(images, row);
+    const double px = compute_unevenness_px(images, row);
     if (!(px < max_ratio * min_px)) continue;
     min_px = px;
     best = row;
   }
-  return min_px < max_ratio * compute_row_unevenness_px(images, stated) ? best : stated;
+  return min_px < max_ratio * compute_unevenness_px(images, stated) ? best : stated;
 }
 
 }  // namespace vlp

@@ -24,8 +24,8 @@ namespace vlp {
 /// the image: by 180 degrees, or by multiples of 90 degrees if it is square. This may exchange the
 /// two ends of the board. Lens and warp do not change, because the warp is the same from both ends.
 /// The warp of a square board cannot be determined.
-void renumber_lattice_points(std::vector<PointDetection>& points, int cols, int rows,
-                             bool has_180_degree_symmetry);
+void renumber_lattice(std::vector<PointDetection>& points, int cols, int rows,
+                      bool has_180_degree_symmetry);
 
 /// Pixels (u, v) in one image of all points of a board's lattice, row by row. std::nullopt for a
 /// point that was not detected.
@@ -34,7 +34,6 @@ using LatticePixels = std::vector<std::optional<Eigen::Vector2d>>;
 /// Estimates the number of points in a row of the lattice. Returns `stated`, unless another number
 /// makes the points of all images lie along their rows twice as evenly.
 /// @pre All images show the same lattice.
-std::size_t estimate_points_per_lattice_row(std::span<const LatticePixels> images,
-                                            std::size_t stated);
+std::size_t estimate_points_per_row(std::span<const LatticePixels> images, std::size_t stated);
 
 }  // namespace vlp

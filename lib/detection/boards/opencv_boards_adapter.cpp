@@ -20,7 +20,7 @@ namespace vlp {
 namespace {
 
 /// Returns OpenCV's dictionaries by name, including those of the AprilTag families.
-const std::map<std::string, int>& list_aruco_dictionaries() {
+const std::map<std::string, int>& list_dictionaries() {
   using namespace cv::aruco;
   static const std::map<std::string, int> all{
       {"DICT_4X4_50", DICT_4X4_50},
@@ -48,11 +48,11 @@ const std::map<std::string, int>& list_aruco_dictionaries() {
   return all;
 }
 
-int find_dictionary(const std::string& name) {
-  const auto found = list_aruco_dictionaries().find(name);
-  if (found != list_aruco_dictionaries().end()) return found->second;
+int look_up_dictionary(const std::string& name) {
+  const auto found = list_dictionaries().find(name);
+  if (found != list_dictionaries().end()) return found->second;
   std::string names;
-  for (const auto& [known, number] : list_aruco_dictionaries()) {
+  for (const auto& [known, number] : list_dictionaries()) {
     names += (names.empty() ? "" : ", ") + known;
   }
   throw std::invalid_argument("OpenCV has no dictionary '" + name + "', but " + names);
@@ -60,17 +60,13 @@ int find_dictionary(const std::string& name) {
 
 #ifdef VLP_ARUCO_IS_A_CLASS
 using Dictionary = cv::aruco::Dictionary;
-const cv::aruco::Dictionary& get_aruco_dictionary(const Dictionary& dictionary) {
-  return dictionary;
-}
+const cv::aruco::Dictionary& get_dictionary(const Dictionary& dictionary) { return dictionary; }
 #else
 using Dictionary = cv::Ptr<cv::aruco::Dictionary>;
-const cv::aruco::Dictionary& get_aruco_dictionary(const Dictionary& dictionary) {
-  return *dictionary;
-}
+const cv::aruco::Dictionary& get_dictionary(const Dictionary& dictionary) { return *dictionary; }
 #endif
 
-int find_tag_dictionary(const std::string& family) {
+int require_dictionary(const std::string& family) {
   if (family == "tag36h11") return cv::aruco::DICT_APRILTAG_36h11;
   if (family == "tag25h9") return cv::aruco::DICT_APRILTAG_25h9;
   if (family == "tag16h5") return cv::aruco::DICT_APRILTAG_16h5;
@@ -89,7 +85,7 @@ class ArucoFinder : public TagFinder {
   explicit ArucoFinder(const Board& board)
       : charuco_(board.kind == BoardKind::charuco),
         dictionary_(cv::aruco::getPredefinedDictionary(
-            charuco_ ? find_dictionary(board.family) : find_tag_dictionary(board.family))),
+            charuco_ ? look_up_dictionary(board.family) : require_dictionary(board.family))),
         border_bits_(board.border_bits) {}
 
   std::vector<TagDetection> detect_tags(const cv::Mat1b& image) const override {
@@ -129,9 +125,9 @@ class ArucoFinder : public TagFinder {
 };
 
 ArucoMarker make_marker(const std::string& name, int id) {
-  const Dictionary dictionary = cv::aruco::getPredefinedDictionary(find_dictionary(name));
-  const cv::Mat& codes = get_aruco_dictionary(dictionary).bytesList;
-  const int width = get_aruco_dictionary(dictionary).markerSize;
+  const Dictionary dictionary = cv::aruco::getPredefinedDictionary(look_up_dictionary(name));
+  const cv::Mat& codes = get_dictionary(dictionary).bytesList;
+  const int width = get_dictionary(dictionary).markerSize;
   if (id < 0 || id >= codes.rows) {
     throw std::invalid_argument(name + " has no marker " + std::to_string(id) + ", only 0 to " +
                                 std::to_string(codes.rows - 1));
@@ -150,22 +146,22 @@ std::unique_ptr<TagFinder> make_aruco_finder(const Board& board) {
 constexpr int kChessboardFlags = cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_EXHAUSTIVE;
 
 /// Seeds OpenCV's random number generator equally for each image, so that results are reproducible.
-void seed_random_generator() { cv::theRNG().state = 1; }
+void seed_generator() { cv::theRNG().state = 1; }
 
-std::vector<cv::Point2f> find_corners(const cv::Mat& image, const cv::Size& size,
-                                      ChessboardSearch search) {
+std::vector<cv::Point2f> detect_corners(const cv::Mat& image, const cv::Size& size,
+                                        ChessboardSearch search) {
   std::vector<cv::Point2f> corners;
-  seed_random_generator();
+  seed_generator();
   const bool found = search == ChessboardSearch::by_squares
                          ? cv::findChessboardCorners(image, size, corners)
                          : cv::findChessboardCornersSB(image, size, corners, kChessboardFlags);
   return found ? corners : std::vector<cv::Point2f>();
 }
 
-cv::Size find_size_in_corners(const cv::Mat& image, const cv::Size& min_size) {
+cv::Size detect_size_in_corners(const cv::Mat& image, const cv::Size& min_size) {
   std::vector<cv::Point2f> corners;
   cv::Mat corner_metadata;  // one element per corner
-  seed_random_generator();
+  seed_generator();
   const bool found = cv::findChessboardCornersSB(
       image, min_size, corners, kChessboardFlags | cv::CALIB_CB_LARGER, corner_metadata);
   return found ? corner_metadata.size() : cv::Size();
@@ -192,7 +188,7 @@ std::vector<PlanarPose> estimate_poses(const std::vector<cv::Point3d>& in_board_
 extern "C" __attribute__((visibility("default"))) const vlp::OpencvBoardFunctions*
 vlp_opencv_board_functions() {
   static constexpr vlp::OpencvBoardFunctions functions{
-      &vlp::make_aruco_finder, &vlp::make_marker, &vlp::find_corners, &vlp::find_size_in_corners,
-      &vlp::estimate_poses};
+      &vlp::make_aruco_finder, &vlp::make_marker, &vlp::detect_corners,
+      &vlp::detect_size_in_corners, &vlp::estimate_poses};
   return &functions;
 }

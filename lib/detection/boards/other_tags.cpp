@@ -73,7 +73,7 @@ std::string describe_tags(const Board& board) {
 
 }  // namespace
 
-std::string find_and_describe_tags_of_other_kinds(const Board& board, const cv::Mat& image) {
+std::string describe_other_tags(const Board& board, const cv::Mat& image) {
   if (board.kind == BoardKind::chessboard) return "";  // it has none
   cv::Mat mirrored;
   cv::flip(image, mirrored, 1);

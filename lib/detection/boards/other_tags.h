@@ -13,6 +13,6 @@ namespace vlp {
 /// of another family or border width, or markers of another dictionary. Tags of another kind count
 /// only if there are more of them than tags of the board. Takes about a second per image.
 /// @return the pattern in one line for a message; empty if none is detected, and for chessboards
-std::string find_and_describe_tags_of_other_kinds(const Board& board, const cv::Mat& image);
+std::string describe_other_tags(const Board& board, const cv::Mat& image);
 
 }  // namespace vlp

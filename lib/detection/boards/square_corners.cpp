@@ -39,7 +39,7 @@ struct SearchStep {
 
 /// Returns the steps of a search, the fastest first. The search by squares takes seconds if a large
 /// image does not show the board, and is therefore used for reduced images only.
-std::vector<SearchStep> plan_chessboard_search(const cv::Size& size) {
+std::vector<SearchStep> plan_search(const cv::Size& size) {
   // OpenCV's search by squares requires a window of some pixels.
   constexpr int min_by_squares_px = 30, min_side_px = 200;
   const auto round_up = [](double value) {
@@ -77,7 +77,7 @@ double scale_to_full_resolution(float at, int large, int small) {
 
 namespace {
 
-/// Fits a corner by fit_edge_intersection_at_corner() in a window that is large enough for the
+/// Fits a corner by fit_edge_crossing() in a window that is large enough for the
 /// blur.
 /// @param free_px  distance from the corner within which only its squares are visible
 std::optional<FittedCorner> fit_corner(const cv::Mat1b& image, const Eigen::Vector2d& guess_px,
@@ -88,7 +88,7 @@ std::optional<FittedCorner> fit_corner(const cv::Mat1b& image, const Eigen::Vect
   const double largest_px = std::clamp(free_px * free_fraction, min_radius_px, max_radius_px);
   double radius_px = std::min(sharp_radius_px, largest_px);
   for (;;) {
-    const auto fit = fit_edge_intersection_at_corner(image, guess_px, along, radius_px);
+    const auto fit = fit_edge_crossing(image, guess_px, along, radius_px);
     const double required_px = fit ? radius_to_blur_ratio * fit->blur_px : 2 * radius_px;
     if (radius_px >= std::min(required_px, largest_px)) return fit;
     radius_px = std::min(1.1 * required_px, largest_px);
@@ -104,8 +104,8 @@ SquareCorners::SquareCorners(const Board& board)
       margin_m_((board.square_size_m - board.tag_size_m) / 2),
       layout_(list_board_tags(board)) {}
 
-std::vector<PointDetection> SquareCorners::refine_corner_guesses(const std::vector<Guess>& guesses,
-                                                                 const GrayLevels& image) const {
+std::vector<PointDetection> SquareCorners::refine_guesses(const std::vector<Guess>& guesses,
+                                                          const GrayLevels& image) const {
   constexpr int min_px = 2, max_px = 5;
   constexpr double edge_px = 2;  // a corner nearer to the image's edge is cut short
   std::vector<PointDetection> points;
@@ -223,11 +223,10 @@ bool is_chessboard_confirmed(const std::vector<PointDetection>& corners, int col
 
 }  // namespace
 
-std::vector<PointDetection> SquareCorners::find_chessboard(const cv::Mat1b& image) const {
-  for (const auto& [reduction, search] : plan_chessboard_search(image.size())) {
+std::vector<PointDetection> SquareCorners::search_chessboard(const cv::Mat1b& image) const {
+  for (const auto& [reduction, search] : plan_search(image.size())) {
     const cv::Mat searched = reduce_image(image, reduction);
-    const std::vector<cv::Point2f> found =
-        find_chessboard_corners(searched, {cols_, rows_}, search);
+    const std::vector<cv::Point2f> found = detect_square_corners(searched, {cols_, rows_}, search);
     if (found.empty()) continue;
     std::vector<PointDetection> points;
     for (std::size_t i = 0; i < found.size(); ++i) {
@@ -235,15 +234,14 @@ std::vector<PointDetection> SquareCorners::find_chessboard(const cv::Mat1b& imag
                         {scale_to_full_resolution(found[i].x, image.cols, searched.cols),
                          scale_to_full_resolution(found[i].y, image.rows, searched.rows)}});
     }
-    renumber_lattice_points(points, cols_, rows_, true);
+    renumber_lattice(points, cols_, rows_, true);
     if (are_corners_of_whole_board(points, cols_, rows_, image)) return points;
   }
   return {};
 }
 
-std::vector<PointDetection> SquareCorners::detect_chessboard_corners(
-    const GrayLevels& image) const {
-  const std::vector<PointDetection> points = find_chessboard(image.sharp);
+std::vector<PointDetection> SquareCorners::detect_chessboard(const GrayLevels& image) const {
+  const std::vector<PointDetection> points = search_chessboard(image.sharp);
   if (points.empty()) return {};
   const auto at = [&](int col, int row) {
     return points[static_cast<std::size_t>(row * cols_ + col)].pixel;
@@ -261,11 +259,11 @@ std::vector<PointDetection> SquareCorners::detect_chessboard_corners(
                          std::min((right - here).norm(), (down - here).norm())});
     }
   }
-  auto corners = refine_corner_guesses(guesses, image);
+  auto corners = refine_guesses(guesses, image);
   return is_chessboard_confirmed(corners, cols_, rows_) ? corners : std::vector<PointDetection>();
 }
 
-std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
+std::vector<PointDetection> SquareCorners::detect_near_markers(
     const std::vector<TagDetection>& markers, const GrayLevels& image) const {
   constexpr double adjacent = 0.8, near = 2.2;  // in squares
   constexpr double max_marker_error =
@@ -274,8 +272,8 @@ std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
   for (int row = 0; row < rows_; ++row) {
     for (int col = 0; col < cols_; ++col) {
       const Eigen::Vector2d here_m = square_size_m_ * Eigen::Vector2d(col, row);
-      const auto [pairs, nearest_m] = find_nearest_tag_corners(
-          markers, layout_, near * square_size_m_, [&](const BoardTag& tag) {
+      const auto [pairs, nearest_m] =
+          match_tag_corners(markers, layout_, near * square_size_m_, [&](const BoardTag& tag) {
             return ((tag.corners_m[0] + tag.corners_m[2]) / 2 - here_m).norm();
           });
       if (nearest_m > adjacent * square_size_m_) continue;
@@ -297,12 +295,12 @@ std::vector<PointDetection> SquareCorners::detect_corners_near_markers(
                          std::sqrt(2) * square_px * margin_m_ / square_size_m_});
     }
   }
-  return refine_corner_guesses(guesses, image);
+  return refine_guesses(guesses, image);
 }
 
-std::array<int, 2> SquareCorners::detect_largest_chessboard_part(const cv::Mat1b& image) const {
-  const int reduction = plan_chessboard_search(image.size()).front().reduction;
-  const cv::Size corners = find_chessboard_size_in_corners(reduce_image(image, reduction), {3, 3});
+std::array<int, 2> SquareCorners::detect_largest_part(const cv::Mat1b& image) const {
+  const int reduction = plan_search(image.size()).front().reduction;
+  const cv::Size corners = detect_chessboard_size(reduce_image(image, reduction), {3, 3});
   if (corners.empty()) return {0, 0};
   std::array<int, 2> squares{corners.width + 1, corners.height + 1};
   // The board may be rotated by 90 degrees.
@@ -310,9 +308,9 @@ std::array<int, 2> SquareCorners::detect_largest_chessboard_part(const cv::Mat1b
   return squares;
 }
 
-std::array<int, 2> get_range_of_chessboard_reductions(const cv::Size& size) {
+std::array<int, 2> get_reduction_range(const cv::Size& size) {
   const auto [finest, coarsest] =
-      std::ranges::minmax(plan_chessboard_search(size), {}, &SearchStep::reduction);
+      std::ranges::minmax(plan_search(size), {}, &SearchStep::reduction);
   return {finest.reduction, coarsest.reduction};
 }
 
@@ -333,7 +331,7 @@ TouchingTags::TouchingTags(const Board& board)
       family_(make_tag_family(board.family)),
       border_bits_(board.border_bits),
       tag_size_m_(board.tag_size_m) {
-  const double width = tag_width_with_border_in_bits(*family_, border_bits_);
+  const double width = tag_width_bits(*family_, border_bits_);
   free_fraction_ = std::min(board.tag_spacing, border_bits_ / width);
 }
 
@@ -357,14 +355,14 @@ std::optional<TagDetection> TouchingTags::refine_tag_corners(TagDetection tag,
     tag.corners_px[k] = found->pixel;
     tag.corner_sds_px[k] = found->sd_px;
   }
-  if (!image_matches_tag_bits(tag, image.sharp, *family_, border_bits_)) return {};
+  if (!has_tag_bits(tag, image.sharp, *family_, border_bits_)) return {};
   return tag;
 }
 
 std::optional<TagDetection> TouchingTags::predict_missing_tag(
     const BoardTag& missing, const std::vector<TagDetection>& tags) const {
   constexpr double max_distance = 2.2;  // in tags: neighbors, including diagonal ones
-  const auto [pairs, nearest_m] = find_nearest_tag_corners(
+  const auto [pairs, nearest_m] = match_tag_corners(
       tags, layout_, max_distance * tag_size_m_,
       [&](const BoardTag& tag) { return (tag.corners_m[0] - missing.corners_m[0]).norm(); });
   if (pairs.empty()) return {};
@@ -376,8 +374,8 @@ std::optional<TagDetection> TouchingTags::predict_missing_tag(
   return tag;
 }
 
-TouchingTags::CompletedTags TouchingTags::refine_and_complete_tags(
-    const std::vector<TagDetection>& rough, const GrayLevels& image) const {
+TouchingTags::CompletedTags TouchingTags::complete_tags(const std::vector<TagDetection>& rough,
+                                                        const GrayLevels& image) const {
   CompletedTags result;
   std::set<int> refined_ids;
   const auto refine = [&](const std::optional<TagDetection>& guess) {

@@ -16,7 +16,7 @@
 namespace vlp {
 
 /// Detector of the corners where the squares of a chessboard or of a ChArUco board touch. Corners
-/// are the intersections of the edges (fit_edge_intersection_at_corner()), or the saddle points if
+/// are the intersections of the edges (fit_edge_crossing()), or the saddle points if
 /// their fit fails. Safe to share between threads.
 class SquareCorners {
  public:
@@ -25,16 +25,16 @@ class SquareCorners {
   /// Detects the inner corners of a chessboard: searches by OpenCV in the image at several
   /// resolutions, then a sub-pixel fit at full resolution. Returns all corners, or none if the
   /// board is not completely in view, or is a part of a larger chessboard. They are numbered row by
-  /// row, with the rows to the right in the image (renumber_lattice_points()). The first corner may
+  /// row, with the rows to the right in the image (renumber_lattice()). The first corner may
   /// be at either end of the board, which looks the same rotated by 180 degrees.
-  std::vector<PointDetection> detect_chessboard_corners(const GrayLevels& image) const;
+  std::vector<PointDetection> detect_chessboard(const GrayLevels& image) const;
 
   /// Returns BoardDetection::largest_chessboard_part of an image that does not show all squares.
-  std::array<int, 2> detect_largest_chessboard_part(const cv::Mat1b& image) const;
+  std::array<int, 2> detect_largest_part(const cv::Mat1b& image) const;
 
   /// Detects the corners next to markers whose own corners are accurate to 1 to 2 px.
-  std::vector<PointDetection> detect_corners_near_markers(const std::vector<TagDetection>& markers,
-                                                          const GrayLevels& image) const;
+  std::vector<PointDetection> detect_near_markers(const std::vector<TagDetection>& markers,
+                                                  const GrayLevels& image) const;
 
  private:
   /// Prediction of a corner: its pixel, the next corners along the row and the column, and a
@@ -45,11 +45,11 @@ class SquareCorners {
     std::array<Eigen::Vector2d, 2> next;
     double free_px;
   };
-  std::vector<PointDetection> refine_corner_guesses(const std::vector<Guess>& guesses,
-                                                    const GrayLevels& image) const;
+  std::vector<PointDetection> refine_guesses(const std::vector<Guess>& guesses,
+                                             const GrayLevels& image) const;
   /// Finds the corners of a chessboard, accurate to 0.2 px of a reduced image. Empty if no search
   /// finds it.
-  std::vector<PointDetection> find_chessboard(const cv::Mat1b& image) const;
+  std::vector<PointDetection> search_chessboard(const cv::Mat1b& image) const;
 
   int cols_, rows_;
   double square_size_m_, margin_m_;
@@ -58,7 +58,7 @@ class SquareCorners {
 
 /// Returns the smallest and the largest factor by which SquareCorners reduces an image of this size
 /// to find a chessboard.
-std::array<int, 2> get_range_of_chessboard_reductions(const cv::Size& size);
+std::array<int, 2> get_reduction_range(const cv::Size& size);
 
 /// Detector of tags whose corners touch black squares, from tags found roughly by another detector.
 class TouchingTags {
@@ -79,8 +79,8 @@ class TouchingTags {
   /// Refines the tags of `rough`, then predicts the others by a homography of the nearest refined
   /// tags. If that fails, the nearest tags of `rough` predict a tag: an overexposed board may have
   /// few tags, and none that can be refined. They may be wrong; refined tags take precedence.
-  CompletedTags refine_and_complete_tags(const std::vector<TagDetection>& rough,
-                                         const GrayLevels& image) const;
+  CompletedTags complete_tags(const std::vector<TagDetection>& rough,
+                              const GrayLevels& image) const;
 
  private:
   std::optional<TagDetection> predict_missing_tag(const BoardTag& missing,

@@ -47,10 +47,10 @@ struct AdjoiningPattern {
 };
 
 /// Returns the pixels along edge k of a tag, from approximate edges and blur.
-std::vector<EdgePixel> collect_pixels_near_edge(const cv::Mat1b& image,
-                                                const std::array<EdgeCurve, 4>& approximate,
-                                                std::size_t k, const AdjoiningPattern& pattern,
-                                                const Band& band, double blur_px) {
+std::vector<EdgePixel> collect_edge_pixels(const cv::Mat1b& image,
+                                           const std::array<EdgeCurve, 4>& approximate,
+                                           std::size_t k, const AdjoiningPattern& pattern,
+                                           const Band& band, double blur_px) {
   // Distance from the two adjacent edges, in blurs. It excludes the corners, which the blur rounds.
   constexpr double free_blurs = 3.125, max_free_fraction = 0.3;
   const EdgeCurve &edge = approximate[k], &next = approximate[(k + 1) % 4],
@@ -69,11 +69,10 @@ std::vector<EdgePixel> collect_pixels_near_edge(const cv::Mat1b& image,
     for (int column = roi_min.x(); column <= roi_max.x(); ++column) {
       const Eigen::Vector2d at(column, row);
       const double w = edge.along.dot(at - edge.middle) / edge.half_length_px;
-      const double v = edge.across.dot(at - edge.middle),
-                   offset_px = v - edge.curve_offset_from_straight_line_px(w);
+      const double v = edge.across.dot(at - edge.middle), offset_px = v - edge.curve_offset_px(w);
       if (offset_px < -band.inside_px || offset_px > band.outside_px) continue;
-      if (next.distance_from_curve_px(at) > -free_px ||
-          previous.distance_from_curve_px(at) > -free_px)
+      if (next.signed_distance_outwards_px(at) > -free_px ||
+          previous.signed_distance_outwards_px(at) > -free_px)
         continue;
       pixels.push_back({w, v, static_cast<double>(image(row, column)), pattern.stripe_width_px(w),
                         pattern.predict_white_level(w, edge.half_length_px, blur_px)});
@@ -110,7 +109,7 @@ class TagEdges {
   TagDetection::Steps measure_edge_steps(const cv::Mat1b& image, double gamma) const;
 
  private:
-  void predict_neighbor_patterns(const TagGeometry& print);
+  void predict_neighbors(const TagGeometry& print);
   void collect_all_pixels(const cv::Mat1b& image, double blur_px);
 
   const TagDetection& tag_;
@@ -135,7 +134,7 @@ EdgeCurvature compute_curvature(const EdgeCurve& edge, const Eigen::Vector2d& fr
   const auto off_px = [&](double w) {
     const double at = (begin + end + w * (end - begin)) / 2;
     const Eigen::Vector2d x = edge.middle + edge.along * (at * edge.half_length_px) +
-                              edge.across * edge.curve_offset_from_straight_line_px(at);
+                              edge.across * edge.curve_offset_px(at);
     return across.dot(x - from);
   };
   // Half extent of evenly distributed pixels with the same mean square.
@@ -148,8 +147,8 @@ EdgeCurvature compute_curvature(const EdgeCurve& edge, const Eigen::Vector2d& fr
 /// Returns the standard deviation of the intersection of two edges, averaged over both axes. With
 /// the variances v_a and v_b of the edges' positions across them:
 ///   variance = (v_a + v_b) / (2 sin^2 of the angle between the edges).
-double compute_intersection_sd_px(const EdgeCurve& a, const EdgeFit& fit_a, const EdgeCurve& b,
-                                  const EdgeFit& fit_b) {
+double compute_crossing_sd_px(const EdgeCurve& a, const EdgeFit& fit_a, const EdgeCurve& b,
+                              const EdgeFit& fit_b) {
   const auto variance = [](const EdgeFit& fit) {
     return fit.sum_of_squares / static_cast<double>(fit.pixels) * fit.end_variance;
   };
@@ -157,8 +156,7 @@ double compute_intersection_sd_px(const EdgeCurve& a, const EdgeFit& fit_a, cons
   return std::sqrt((variance(fit_a) + variance(fit_b)) / 2) / std::abs(sine);
 }
 
-double compute_max_difference_px(const std::array<EdgeCurve, 4>& a,
-                                 const std::array<EdgeCurve, 4>& b) {
+double compute_max_change_px(const std::array<EdgeCurve, 4>& a, const std::array<EdgeCurve, 4>& b) {
   double max_px = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     max_px = std::max(max_px, (a[k].coefficients - b[k].coefficients).lpNorm<Eigen::Infinity>());
@@ -188,11 +186,10 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
     }
   }
   edges_ = approximate_;
-  predict_neighbor_patterns(print);
-  const double bit_px = width_px_ / print.width_of_tag_with_border_bits();
-  band_ = {
-      std::clamp(print.stripe_width_inside_tag_edge_bits() * bit_px - away_px, min_px, max_px),
-      std::clamp(print.stripe_width_outside_tag_edge_bits() * bit_px - away_px, min_px, max_px)};
+  predict_neighbors(print);
+  const double bit_px = width_px_ / print.width_bits();
+  band_ = {std::clamp(print.inner_stripe_bits() * bit_px - away_px, min_px, max_px),
+           std::clamp(print.outer_stripe_bits() * bit_px - away_px, min_px, max_px)};
   const auto fit_without_curve = [&] {
     collect_all_pixels(image, kRoughBlur_px);
     fit([](const EdgeCurve&) { return EdgePrior(); });
@@ -202,7 +199,7 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
   for (int iteration = 0;
        iteration < max_iterations && found_ && max_curvature_px_ > refit_threshold_px;
        ++iteration) {
-    if (iteration > 0 && compute_max_difference_px(edges_, approximate_) < tolerance_px) break;
+    if (iteration > 0 && compute_max_change_px(edges_, approximate_) < tolerance_px) break;
     for (EdgeCurve& edge : edges_) {
       edge.cubic = edge.cubic || std::abs(edge.coefficients[2]) > cubic_threshold_px;
     }
@@ -211,11 +208,10 @@ TagEdges::TagEdges(const TagDetection& tag, const cv::Mat1b& image, const TagGeo
   }
 }
 
-void TagEdges::predict_neighbor_patterns(const TagGeometry& print) {
-  const double width = print.width_of_tag_with_border_bits(),
-               deep = print.stripe_width_inside_tag_edge_bits();
+void TagEdges::predict_neighbors(const TagGeometry& print) {
+  const double width = print.width_bits(), deep = print.inner_stripe_bits();
   const std::array<Eigen::Vector2d, 4> square{{{0, 0}, {width, 0}, {width, width}, {0, width}}};
-  const TagGeometry::Sides white = print.find_white_bit_segments_along_tag_edges(tag_.id);
+  const TagGeometry::Sides white = print.list_white_segments(tag_.id);
   for (std::size_t k = 0; k < 4; ++k) {
     std::array<PlanePair, 4> pairs;
     for (std::size_t i = 0; i < 4; ++i) pairs[i] = {square[i], tag_.corners_px[(k + i) % 4]};
@@ -237,7 +233,7 @@ void TagEdges::predict_neighbor_patterns(const TagGeometry& print) {
 
 void TagEdges::collect_all_pixels(const cv::Mat1b& image, double blur_px) {
   for (std::size_t k = 0; k < 4; ++k) {
-    pixels_[k] = collect_pixels_near_edge(image, approximate_, k, patterns_[k], band_, blur_px);
+    pixels_[k] = collect_edge_pixels(image, approximate_, k, patterns_[k], band_, blur_px);
   }
   found_ = false;
 }
@@ -253,8 +249,8 @@ void TagEdges::fit(const std::function<EdgePrior(const EdgeCurve& edge)>& prior_
       edges_[k].coefficients = approximate_[k].coefficients;
       edges_[k].blur_px = approximate_[k].blur_px;
     }
-    const auto fitted = fit_edge_curve_and_blur(edges_[k], pixels_[k], prior_of(approximate_[k]),
-                                                is_known ? &fits_[k] : nullptr);
+    const auto fitted = fit_edge_curve(edges_[k], pixels_[k], prior_of(approximate_[k]),
+                                       is_known ? &fits_[k] : nullptr);
     if (!fitted) return;
     fits_[k] = *fitted;
     max_curvature_px_ = std::max(max_curvature_px_, std::abs(edges_[k].coefficients[2]));
@@ -273,7 +269,7 @@ std::optional<TagDetection::Outline> TagEdges::intersect_edges() const {
   TagDetection::Corners& corners = outline.corners_px;
   for (std::size_t k = 0; k < 4; ++k) {
     const Eigen::Vector2d& from = tag_.corners_px[k];
-    corners[k] = find_edge_intersection(edges_[(k + 3) % 4], edges_[k], from);
+    corners[k] = intersect_edge_curves(edges_[(k + 3) % 4], edges_[k], from);
     if (!((corners[k] - from).norm() < max_displacement_px)) return {};
   }
   for (std::size_t k = 0; k < 4; ++k) {
@@ -281,7 +277,7 @@ std::optional<TagDetection::Outline> TagEdges::intersect_edges() const {
         compute_curvature(edges_[k], corners[k], corners[(k + 1) % 4], pixels_[k]);
     const std::size_t previous = (k + 3) % 4;
     outline.corner_sds_px[k] =
-        compute_intersection_sd_px(edges_[previous], fits_[previous], edges_[k], fits_[k]);
+        compute_crossing_sd_px(edges_[previous], fits_[previous], edges_[k], fits_[k]);
   }
   return outline;
 }
@@ -398,12 +394,12 @@ void EdgeModels::fit_light(const TagSelection& tags) {
 EdgePrior EdgeModels::make_prior(const EdgeCurve& edge, double gamma) const {
   EdgePrior prior{gamma};
   if (blur_) {
-    prior.blur_px = blur_->evaluate_field_at_edge(edge.middle, edge.along);
-    prior.blur_weight = noise_ / (blur_->excess_relative_sd_of_edges() * prior.blur_px);
+    prior.blur_px = blur_->evaluate_at_edge(edge.middle, edge.along);
+    prior.blur_weight = noise_ / (blur_->edge_scatter_beyond_fit_sd() * prior.blur_px);
   }
   if (light_) {
-    prior.bright_light = light_->evaluate_field_at_edge(edge.middle, edge.along);
-    prior.bright_weight = noise_ / (light_->excess_relative_sd_of_edges() * prior.bright_light);
+    prior.bright_light = light_->evaluate_at_edge(edge.middle, edge.along);
+    prior.bright_weight = noise_ / (light_->edge_scatter_beyond_fit_sd() * prior.bright_light);
   }
   return prior;
 }
@@ -480,8 +476,8 @@ void ImageEdges::refine_outlines(const cv::Mat1b& image, double gamma) {
 
 }  // namespace
 
-std::vector<double> refine_tags_by_edge_fits(std::span<TagDetection> tags, const cv::Mat1b& image,
-                                             const TagGeometry& print) {
+std::vector<double> refine_tags(std::span<TagDetection> tags, const cv::Mat1b& image,
+                                const TagGeometry& print) {
   constexpr std::size_t max_selected = 8;
   constexpr double min_log_likelihood_ratio = 10;  // e^10 times more likely
   ImageEdges edges(tags, image, print);

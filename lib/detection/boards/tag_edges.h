@@ -19,7 +19,7 @@ namespace vlp {
 /// @return       BoardDetection::curve_costs, from the eight widest tags
 ///
 /// Edges. Each edge is fitted to the pixels next to it, from corner to corner, as a parabola,
-/// because the lens bends it (fit_edge_curve_and_blur()). The pixels are first those next to
+/// because the lens bends it (fit_edge_curve()). The pixels are first those next to
 /// libapriltag's straight lines. At the rim of a wide lens these lines miss the corners by up to 4
 /// px. If the sagitta of an edge exceeds 0.5 px, all four edges are therefore fitted again to the
 /// pixels next to the fitted curve. Above 1 px the curve has a cubic term.
@@ -40,7 +40,7 @@ namespace vlp {
 /// are therefore fitted again with the blur of the neighboring edges as a prior, and in saturated
 /// images once more with their light. The prior allows for the differences between edges that
 /// exceed their noise.
-std::vector<double> refine_tags_by_edge_fits(std::span<TagDetection> tags, const cv::Mat1b& image,
-                                             const TagGeometry& print);
+std::vector<double> refine_tags(std::span<TagDetection> tags, const cv::Mat1b& image,
+                                const TagGeometry& print);
 
 }  // namespace vlp

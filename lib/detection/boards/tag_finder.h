@@ -23,7 +23,7 @@ class TagFinder {
 /// Creates a detector (libapriltag) of the tags of the board's family, for tags surrounded by
 /// white. Corners are accurate to 0.05 px.
 /// @throws std::invalid_argument if libapriltag does not have the family
-std::unique_ptr<TagFinder> make_apriltag_detector(const Board& board);
+std::unique_ptr<TagFinder> make_apriltag_finder(const Board& board);
 
 /// Creates a detector by OpenCV's ArUco module, for tags whose corners touch black squares and for
 /// the markers of ChArUco boards. Corners are accurate to 1 to 2 px.

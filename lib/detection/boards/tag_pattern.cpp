@@ -33,7 +33,7 @@ TagFamily make_tag_family(const std::string& name) {
   throw std::invalid_argument("there is no tag family " + name);
 }
 
-int tag_width_with_border_in_bits(const apriltag_family_t& family, int border_bits) {
+int tag_width_bits(const apriltag_family_t& family, int border_bits) {
   return family.width_at_border + 2 * (border_bits - 1);
 }
 
@@ -60,10 +60,10 @@ std::optional<float> interpolate_level(const cv::Mat1b& levels, const Eigen::Vec
 
 }  // namespace
 
-bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1b& levels,
-                            const apriltag_family_t& family, int border_bits) {
+bool has_tag_bits(const TagDetection& tag, const cv::Mat1b& levels, const apriltag_family_t& family,
+                  int border_bits) {
   constexpr int max_wrong = 2;
-  const double width = tag_width_with_border_in_bits(family, border_bits);
+  const double width = tag_width_bits(family, border_bits);
   const std::array<Eigen::Vector2d, 4> square{{{0, width}, {width, width}, {width, 0}, {0, 0}}};
   std::array<PlanePair, 4> pairs;
   for (std::size_t k = 0; k < 4; ++k) pairs[k] = {square[k], tag.corners_px[k]};
@@ -94,11 +94,11 @@ bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1b& levels,
 
 TagGeometry::TagGeometry(const Board& board)
     : family_(make_tag_family(board.family)),
-      width_(tag_width_with_border_in_bits(*family_, board.border_bits)),
+      width_(tag_width_bits(*family_, board.border_bits)),
       inside_(board.border_bits),
       outside_(family_->reversed_border ? 1 : board.tag_spacing * width_) {}
 
-TagGeometry::Sides TagGeometry::find_white_bit_segments_along_tag_edges(int id) const {
+TagGeometry::Sides TagGeometry::list_white_segments(int id) const {
   Sides sides;
   if (family_->reversed_border) return sides;
   const int last = static_cast<int>(width_) - 1, border = static_cast<int>(inside_);
@@ -114,9 +114,9 @@ TagGeometry::Sides TagGeometry::find_white_bit_segments_along_tag_edges(int id) 
   return sides;
 }
 
-NearestCorners find_nearest_tag_corners(const std::vector<TagDetection>& tags,
-                                        const std::vector<BoardTag>& layout, double max_distance_m,
-                                        const std::function<double(const BoardTag&)>& distance_m) {
+NearestCorners match_tag_corners(const std::vector<TagDetection>& tags,
+                                 const std::vector<BoardTag>& layout, double max_distance_m,
+                                 const std::function<double(const BoardTag&)>& distance_m) {
   constexpr std::size_t max_tags = 4;
   struct Neighbor {
     double distance_m;

@@ -26,7 +26,7 @@ TagFamily make_tag_family(const std::string& name);
 
 /// Returns the edge length of a tag's square, with its border, in bits. The border is `border_bits`
 /// wide on each side instead of one bit as in the family.
-int tag_width_with_border_in_bits(const apriltag_family_t& family, int border_bits);
+int tag_width_bits(const apriltag_family_t& family, int border_bits);
 
 /// Returns true if bit `bit` (below family.nbits) of the tag `id` is white.
 bool is_tag_bit_white(const apriltag_family_t& family, int id, uint32_t bit);
@@ -38,8 +38,8 @@ bool is_tag_bit_white(const apriltag_family_t& family, int id, uint32_t bit);
 ///
 /// @param levels       gray levels of the image
 /// @param border_bits  width of the printed border, in bits
-bool image_matches_tag_bits(const TagDetection& tag, const cv::Mat1b& levels,
-                            const apriltag_family_t& family, int border_bits);
+bool has_tag_bits(const TagDetection& tag, const cv::Mat1b& levels, const apriltag_family_t& family,
+                  int border_bits);
 
 /// Printed pattern next to the edges of a board's tags, in bits.
 class TagGeometry {
@@ -56,13 +56,13 @@ class TagGeometry {
   explicit TagGeometry(const Board& board);
 
   /// Width of a tag with its border, in bits.
-  double width_of_tag_with_border_bits() const { return width_; }
+  double width_bits() const { return width_; }
   /// Width of the uniform stripe along an edge, inside and outside the tag, in bits.
-  double stripe_width_inside_tag_edge_bits() const { return inside_; }
-  double stripe_width_outside_tag_edge_bits() const { return outside_; }
+  double inner_stripe_bits() const { return inside_; }
+  double outer_stripe_bits() const { return outside_; }
   /// Returns the segments in which white bits adjoin the black stripe inside the edge. Empty for
   /// families with a white border.
-  Sides find_white_bit_segments_along_tag_edges(int id) const;
+  Sides list_white_segments(int id) const;
 
  private:
   TagFamily family_;
@@ -79,8 +79,8 @@ struct NearestCorners {
 
 /// Returns the corners of the detected tags with the smallest `distance_m` below `max_distance_m`.
 /// @pre `layout` has the ids of all tags
-NearestCorners find_nearest_tag_corners(const std::vector<TagDetection>& tags,
-                                        const std::vector<BoardTag>& layout, double max_distance_m,
-                                        const std::function<double(const BoardTag&)>& distance_m);
+NearestCorners match_tag_corners(const std::vector<TagDetection>& tags,
+                                 const std::vector<BoardTag>& layout, double max_distance_m,
+                                 const std::function<double(const BoardTag&)>& distance_m);
 
 }  // namespace vlp

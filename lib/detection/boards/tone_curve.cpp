@@ -28,7 +28,7 @@ struct Parabola {
   }
 
   /// Returns the x of the minimum between both ends.
-  double find_minimum(const std::array<double, 3>& values) const {
+  double locate_minimum(const std::array<double, 3>& values) const {
     const double low = (values[1] - values[0]) / (x(1) - x(0));
     const double high = (values[2] - values[1]) / (x(2) - x(1));
     if (high <= low) return values[0] <= values[2] ? x(0) : x(2);
@@ -38,15 +38,15 @@ struct Parabola {
 };
 
 /// Returns the parabola through the smallest cost and its neighbors.
-Parabola make_parabola_at_minimum(const ValuesPerGamma& costs) {
+Parabola make_parabola(const ValuesPerGamma& costs) {
   const auto best =
       static_cast<std::size_t>(std::min_element(costs.begin(), costs.end()) - costs.begin());
   return {std::clamp<std::size_t>(best, 1, kGammas.size() - 2) - 1};
 }
 
 double estimate_log_gamma(const ValuesPerGamma& costs) {
-  const Parabola parabola = make_parabola_at_minimum(costs);
-  return parabola.find_minimum(
+  const Parabola parabola = make_parabola(costs);
+  return parabola.locate_minimum(
       {costs[parabola.first], costs[parabola.first + 1], costs[parabola.first + 2]});
 }
 
@@ -74,13 +74,11 @@ ValuesPerGamma sum_tone_curve_costs(const std::vector<BoardView>& views) {
   return sums;
 }
 
-double estimate_tone_curve_gamma(const ValuesPerGamma& costs) {
-  return std::exp(estimate_log_gamma(costs));
-}
+double estimate_gamma(const ValuesPerGamma& costs) { return std::exp(estimate_log_gamma(costs)); }
 
-double correct_views_for_tone_curve(std::vector<BoardView>& views, const ValuesPerGamma& costs) {
+double correct_views(std::vector<BoardView>& views, const ValuesPerGamma& costs) {
   constexpr double min_gamma = 1.2;
-  const Parabola parabola = make_parabola_at_minimum(costs);
+  const Parabola parabola = make_parabola(costs);
   const double log_gamma = estimate_log_gamma(costs);
   const bool is_linear = log_gamma < std::log(min_gamma);
   const auto weights = parabola.weights(log_gamma);

@@ -24,9 +24,9 @@ ValuesPerGamma sum_tone_curve_costs(const std::vector<BoardView>& views);
 
 /// Estimates the gamma with the smallest cost, by a parabola over log(gamma) through the smallest
 /// of `costs` and its neighbors.
-double estimate_tone_curve_gamma(const ValuesPerGamma& costs);
+double estimate_gamma(const ValuesPerGamma& costs);
 
-/// Corrects the tags of all views for the tone curve with estimate_tone_curve_gamma(costs) and
+/// Corrects the tags of all views for the tone curve with estimate_gamma(costs) and
 /// returns this gamma. Returns 1 and changes no corner if gamma is below 1.2: sharpening has a
 /// similar effect.
 ///
@@ -34,6 +34,6 @@ double estimate_tone_curve_gamma(const ValuesPerGamma& costs);
 /// kGammas, and standard deviations and steps linearly. An image that certainly has no tone curve
 /// keeps its corners. Clears TagDetection::tone_curve_fits and BoardDetection::curve_costs in all
 /// views.
-double correct_views_for_tone_curve(std::vector<BoardView>& views, const ValuesPerGamma& costs);
+double correct_views(std::vector<BoardView>& views, const ValuesPerGamma& costs);
 
 }  // namespace vlp

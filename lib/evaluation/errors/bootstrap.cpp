@@ -134,7 +134,7 @@ class Resampler {
   std::vector<std::uint32_t> counts_below_;  // at each multiple of step_, by group
 };
 
-Interval make_percentile_interval(std::vector<double> resampled) {
+Interval make_interval(std::vector<double> resampled) {
   constexpr std::size_t outside = kDraws / 40;  // 2.5 % on either side
   std::sort(resampled.begin(), resampled.end());
   return {resampled[outside - 1], resampled[kDraws - outside]};
@@ -142,9 +142,9 @@ Interval make_percentile_interval(std::vector<double> resampled) {
 
 }  // namespace
 
-std::optional<ErrorIntervals> bootstrap_error_intervals(std::span<const double> errors,
-                                                        std::span<const std::size_t> clusters,
-                                                        int threads) {
+std::optional<ErrorIntervals> bootstrap_intervals(std::span<const double> errors,
+                                                  std::span<const std::size_t> clusters,
+                                                  int threads) {
   if (errors.empty()) return std::nullopt;
   const Groups groups = assign_groups(clusters);
   if (groups.clusters < kMinClusters) return std::nullopt;
@@ -159,10 +159,9 @@ std::optional<ErrorIntervals> bootstrap_error_intervals(std::span<const double> 
     resampled[3][i] = rms;
   });
   std::optional<Interval> p90;
-  if (groups.clusters >= kMinClustersForP90) p90 = make_percentile_interval(resampled[2]);
-  return ErrorIntervals{make_percentile_interval(resampled[0]),
-                        make_percentile_interval(resampled[1]), p90,
-                        make_percentile_interval(resampled[3]), groups.clusters};
+  if (groups.clusters >= kMinClustersForP90) p90 = make_interval(resampled[2]);
+  return ErrorIntervals{make_interval(resampled[0]), make_interval(resampled[1]), p90,
+                        make_interval(resampled[3]), groups.clusters};
 }
 
 }  // namespace vlp

@@ -27,7 +27,7 @@ struct ErrorIntervals {
 /// Minimum number of clusters for intervals.
 inline constexpr std::size_t kMinClusters = 5;
 /// Minimum number of clusters for an interval of the 90th percentile, see
-/// bootstrap_error_intervals().
+/// bootstrap_intervals().
 inline constexpr std::size_t kMinClustersForP90 = 20;
 
 /// Computes confidence intervals of error statistics (ErrorStatistics) by the percentile bootstrap
@@ -53,8 +53,8 @@ inline constexpr std::size_t kMinClustersForP90 = 20;
 /// 10 / 20 / 50 / 100 clusters and one horizontal error each: mean 85 / 90 / 93 / 94 / 95 %, p90 40
 /// / 64 / 87 / 88 / 94 %. Hence kMinClusters and kMinClustersForP90. The seeds are fixed: the same
 /// errors yield the same intervals for any number of threads.
-std::optional<ErrorIntervals> bootstrap_error_intervals(std::span<const double> errors,
-                                                        std::span<const std::size_t> clusters,
-                                                        int threads);
+std::optional<ErrorIntervals> bootstrap_intervals(std::span<const double> errors,
+                                                  std::span<const std::size_t> clusters,
+                                                  int threads);
 
 }  // namespace vlp

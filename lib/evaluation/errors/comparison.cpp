@@ -88,15 +88,15 @@ QuantityComparison compare_quantity(const ComparedQuantity& quantity,
   comparison.min_relevant =
       std::max({quantity.min_difference, kMinDifferenceFraction * others / count,
                 quantity.correct_mean - others / count});
-  const auto intervals = bootstrap_error_intervals(differences, clusters, threads);
+  const auto intervals = bootstrap_intervals(differences, clusters, threads);
   if (intervals) comparison.interval = intervals->mean;
   comparison.clusters = count_distinct(std::move(clusters));
   return comparison;
 }
 
 /// Returns true if a quantity is known in one of the fixes only.
-bool is_quantity_in_one_only(const ErrorPair& pair, const std::vector<FixRow>& fixes,
-                             const std::vector<FixRow>& other_fixes) {
+bool is_in_one_only(const ErrorPair& pair, const std::vector<FixRow>& fixes,
+                    const std::vector<FixRow>& other_fixes) {
   return std::ranges::any_of(kComparedQuantities, [&](const ComparedQuantity& quantity) {
     return quantity.compute(other_fixes[pair.other->fix], *pair.other).has_value() !=
            quantity.compute(fixes[pair.error->fix], *pair.error).has_value();
@@ -105,7 +105,7 @@ bool is_quantity_in_one_only(const ErrorPair& pair, const std::vector<FixRow>& f
 
 }  // namespace
 
-std::span<const ComparedQuantity, 5> list_compared_quantities() { return kComparedQuantities; }
+std::span<const ComparedQuantity, 5> list_quantities() { return kComparedQuantities; }
 
 std::string_view QuantityComparison::comparison_verdict() const {
   if (has_too_few_clusters() || !interval) return "inconclusive";
@@ -120,12 +120,11 @@ double QuantityComparison::compute_loss() const {
   return interval->low > 0 && interval->low <= min_relevant ? 0 : interval->low;
 }
 
-std::string QuantityComparison::describe_comparison_result(const ComparedQuantity& quantity) const {
+std::string QuantityComparison::describe_result(const ComparedQuantity& quantity) const {
   constexpr int digits = 2;
   const std::string unit = quantity.unit;
-  const std::string threshold =
-      format_significant_digits(quantity.units_per_si * min_relevant, digits) +
-      (unit.empty() ? "" : " ") + unit;
+  const std::string threshold = format_digits(quantity.units_per_si * min_relevant, digits) +
+                                (unit.empty() ? "" : " ") + unit;
   std::string words(comparison_verdict());
   if (words == "equivalent") return words.append(" within ").append(threshold);
   if (words == "inconclusive") return words.append(has_too_few_clusters() ? ", too few" : "");
@@ -161,7 +160,7 @@ Comparison compare_fix_errors(const std::vector<FixRow>& fixes, const std::vecto
       continue;
     }
     pairs.push_back({&error, errors_of_others[*other]});
-    if (is_quantity_in_one_only(pairs.back(), fixes, other_fixes)) ++comparison.unpaired;
+    if (is_in_one_only(pairs.back(), fixes, other_fixes)) ++comparison.unpaired;
   }
   comparison.pairs = pairs.size();
   comparison.only_in_other_fixes = other_errors.size() - comparison.pairs;

@@ -43,14 +43,14 @@ struct ComparedQuantity {
 
 /// Returns horizontal error, height error, yaw error, horizontal standard deviation, and the RMS of
 /// error / standard deviation over x, y, z and yaw.
-std::span<const ComparedQuantity, 5> list_compared_quantities();
+std::span<const ComparedQuantity, 5> list_quantities();
 
 /// Comparison of one quantity over the captures that have it in both sets of fixes, in SI units.
 struct QuantityComparison {
   /// Number of captures, of those with a smaller and with a larger first value, and of their
   /// clusters (FixError::cluster).
   std::size_t pairs = 0, smaller = 0, larger = 0, clusters = 0;
-  /// Mean of (first value - second value) and its confidence interval (bootstrap_error_intervals()
+  /// Mean of (first value - second value) and its confidence interval (bootstrap_intervals()
   /// of the differences, resampled by the clusters of the first).
   double mean_difference = 0;
   std::optional<Interval> interval;
@@ -69,7 +69,7 @@ struct QuantityComparison {
   double compute_loss() const;
   /// Returns, for example, "worse by more than 0.004 mm", with min_relevant if the verdict depends
   /// on it.
-  std::string describe_comparison_result(const ComparedQuantity& quantity) const;
+  std::string describe_result(const ComparedQuantity& quantity) const;
 };
 
 /// Comparison of two sets of fixes of the same captures.
@@ -79,7 +79,7 @@ struct Comparison {
   /// Number of captures that escape the comparison: with a fix in the second only, with a quantity
   /// in one of both only, or without a row in the second.
   std::size_t unpaired = 0;
-  /// Comparisons in the order of list_compared_quantities(); without pairs if a quantity is
+  /// Comparisons in the order of list_quantities(); without pairs if a quantity is
   /// unknown.
   std::array<QuantityComparison, 5> quantities{};
 

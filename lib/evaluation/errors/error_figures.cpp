@@ -31,11 +31,11 @@ struct Sums {
 
 }  // namespace
 
-double find_quantile(std::span<const double> sorted, double fraction) {
+double get_quantile(std::span<const double> sorted, double fraction) {
   return sorted[quantile_index(fraction, sorted.size())];
 }
 
-ErrorStatistics compute_error_statistics(std::vector<double> errors) {
+ErrorStatistics summarize_errors(std::vector<double> errors) {
   ErrorStatistics statistics{errors.size(), 0, 0, 0, 0, 0};
   double squares = 0;
   for (const double error : errors) {
@@ -51,22 +51,22 @@ ErrorStatistics compute_error_statistics(std::vector<double> errors) {
   return statistics;
 }
 
-SignedErrorStatistics compute_signed_error_statistics(std::vector<double> errors) {
+SignedErrorStatistics summarize_signed_errors(std::vector<double> errors) {
   double sum = 0;
   for (double& error : errors) {
     sum += error;
     error = std::abs(error);
   }
   const double bias = sum / static_cast<double>(errors.size());
-  return {bias, compute_error_statistics(std::move(errors))};
+  return {bias, summarize_errors(std::move(errors))};
 }
 
-std::vector<std::pair<double, double>> compute_error_percentiles(std::vector<double> errors) {
+std::vector<std::pair<double, double>> list_percentiles(std::vector<double> errors) {
   std::sort(errors.begin(), errors.end());
   std::vector<std::pair<double, double>> points;
   points.reserve(100);
   for (int percent = 1; percent <= 100; ++percent) {
-    points.emplace_back(percent / 100.0, find_quantile(errors, percent / 100.0));
+    points.emplace_back(percent / 100.0, get_quantile(errors, percent / 100.0));
   }
   return points;
 }

@@ -24,11 +24,11 @@ struct ErrorStatistics {
 /// all values does not exceed. It is never interpolated.
 /// @param sorted    values in ascending order, not empty
 /// @param fraction  0 < fraction <= 1
-double find_quantile(std::span<const double> sorted, double fraction);
+double get_quantile(std::span<const double> sorted, double fraction);
 
 /// Computes the statistics of errors without sign.
 /// @pre not empty
-ErrorStatistics compute_error_statistics(std::vector<double> errors);
+ErrorStatistics summarize_errors(std::vector<double> errors);
 
 /// Statistics of errors with a sign, such as heights: their mean, and the statistics of their
 /// absolute values.
@@ -36,11 +36,11 @@ struct SignedErrorStatistics {
   double bias;
   ErrorStatistics magnitudes;
 };
-SignedErrorStatistics compute_signed_error_statistics(std::vector<double> errors);
+SignedErrorStatistics summarize_signed_errors(std::vector<double> errors);
 
 /// Returns the percentiles of the errors, 1 % to 100 %, as pairs of fraction and quantile.
 /// @pre not empty
-std::vector<std::pair<double, double>> compute_error_percentiles(std::vector<double> errors);
+std::vector<std::pair<double, double>> list_percentiles(std::vector<double> errors);
 
 /// Bias and repeatability over the reference points with two fixes or more.
 struct BiasAndRepeatability {
@@ -66,7 +66,7 @@ struct BiasAndRepeatability {
   double bias_m;
 };
 
-/// Computes bias and scatter from the errors of compute_fix_errors_against_truth(). Returns
+/// Computes bias and scatter from the errors of compare_with_truth(). Returns
 /// std::nullopt if no reference point has two fixes.
 std::optional<BiasAndRepeatability> compute_bias_and_repeatability(
     const std::vector<FixError>& errors, const std::vector<TruthRow>& truth);

@@ -24,7 +24,7 @@ class Ratios {
     return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_)))
                       : std::nullopt;
   }
-  std::optional<double> fraction_within_95_percent() const {
+  std::optional<double> fraction_within_95() const {
     return count_ > 0 ? std::optional(static_cast<double>(within_) / static_cast<double>(count_))
                       : std::nullopt;
   }
@@ -36,8 +36,8 @@ class Ratios {
 
 }  // namespace
 
-std::optional<NormalizedErrors> compute_normalized_errors(const std::vector<FixRow>& fixes,
-                                                          const std::vector<FixError>& errors) {
+std::optional<NormalizedErrors> normalize_errors(const std::vector<FixRow>& fixes,
+                                                 const std::vector<FixError>& errors) {
   Ratios horizontal, height, yaw;
   std::size_t fixes_with_sd = 0;
   for (const FixError& error : errors) {
@@ -54,9 +54,9 @@ std::optional<NormalizedErrors> compute_normalized_errors(const std::vector<FixR
                           fixes_with_sd,
                           height.value(),
                           yaw.value(),
-                          *horizontal.fraction_within_95_percent(),
-                          height.fraction_within_95_percent(),
-                          yaw.fraction_within_95_percent()};
+                          *horizontal.fraction_within_95(),
+                          height.fraction_within_95(),
+                          yaw.fraction_within_95()};
 }
 
 bool CrlbRatio::are_errors_below_crlb() const {
@@ -64,18 +64,18 @@ bool CrlbRatio::are_errors_below_crlb() const {
   return horizontal < 1 - num_sds * sd;
 }
 
-std::optional<CrlbRatio> compute_error_to_crlb_ratio(const std::vector<FixError>& errors,
-                                                     const std::vector<TruthRow>& truth,
-                                                     const LampMap& lamps, const Camera& camera,
-                                                     double noise_px, int threads) {
+std::optional<CrlbRatio> compute_crlb_ratio(const std::vector<FixError>& errors,
+                                            const std::vector<TruthRow>& truth,
+                                            const LampMap& lamps, const Camera& camera,
+                                            double noise_px, int threads) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   std::vector<Eigen::Matrix2d> limits_m2(errors.size(), Eigen::Matrix2d::Zero());  // 0: no limit
   parallel_for(errors.size(), threads, [&](std::size_t i) {
     const TruthRow& place = truth[errors[i].truth];
     if (!place.z_m || !place.yaw_rad) return;
     const Pose pose{{place.xy_m.x(), place.xy_m.y(), *place.z_m}, *place.yaw_rad};
-    const auto budget = compute_fix_error_budget(find_visible_lamps(lamps, camera, pose), lens,
-                                                 pose, {noise_px, 0, 0, 0});
+    const auto budget = compute_fix_budget(list_visible_positions(lamps, camera, pose), lens, pose,
+                                           {noise_px, 0, 0, 0});
     if (budget) limits_m2[i] = budget->noise.topLeftCorner<2, 2>();
   });
   double errors_m2 = 0, limit_m2 = 0, variance_m4 = 0;

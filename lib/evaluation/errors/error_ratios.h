@@ -30,8 +30,8 @@ struct NormalizedErrors {
 inline constexpr double kWithin95 = 1.959964;
 /// Computes the normalized errors. Returns std::nullopt if no fix reports standard deviations. Not
 /// for errors against a path, which lack the component along it.
-std::optional<NormalizedErrors> compute_normalized_errors(const std::vector<FixRow>& fixes,
-                                                          const std::vector<FixError>& errors);
+std::optional<NormalizedErrors> normalize_errors(const std::vector<FixRow>& fixes,
+                                                 const std::vector<FixError>& errors);
 
 /// Errors in units of the theoretical limit (Cramer-Rao lower bound).
 struct CrlbRatio {
@@ -58,9 +58,9 @@ struct CrlbRatio {
 /// Returns std::nullopt if the ground truth has no height and yaw, or if two lamps are visible from
 /// no position.
 /// @pre noise_px > 0, intrinsics match the lens model, threads > 0
-std::optional<CrlbRatio> compute_error_to_crlb_ratio(const std::vector<FixError>& errors,
-                                                     const std::vector<TruthRow>& truth,
-                                                     const LampMap& lamps, const Camera& camera,
-                                                     double noise_px, int threads);
+std::optional<CrlbRatio> compute_crlb_ratio(const std::vector<FixError>& errors,
+                                            const std::vector<TruthRow>& truth,
+                                            const LampMap& lamps, const Camera& camera,
+                                            double noise_px, int threads);
 
 }  // namespace vlp

@@ -49,7 +49,7 @@ std::vector<std::size_t> group_captures(const std::vector<TruthRow>& truth, doub
   for (const TruthRow& row : truth) {
     places_m.emplace_back(row.xy_m.x(), row.xy_m.y(), row.z_m.value_or(0));
   }
-  return assign_positions_to_reference_points(places_m, radius_m);
+  return group_positions(places_m, radius_m);
 }
 
 /// Unit that tables can have by mistake in place of that of the column.
@@ -97,11 +97,10 @@ void check_units(const FixErrors& errors, const FileRows<FixRow>& fixes,
   constexpr std::size_t min_fixes = 3;
   for (const TruthColumn& column : kTruthColumns) {
     const auto compute_median = [&](double factor) -> std::optional<double> {
-      const auto values =
-          collect_values_and_clusters_of_fix_errors(errors.errors, [&](const FixError& error) {
-            return column.compute_error(fixes.rows[error.fix].fix->pose, truth.rows[error.truth],
-                                        factor);
-          }).values;
+      const auto values = collect_component(errors.errors, [&](const FixError& error) {
+                            return column.compute_error(fixes.rows[error.fix].fix->pose,
+                                                        truth.rows[error.truth], factor);
+                          }).values;
       return values.size() < min_fixes ? std::nullopt : std::optional(lower_median(values));
     };
     const auto error = compute_median(1);
@@ -122,8 +121,8 @@ void check_units(const FixErrors& errors, const FileRows<FixRow>& fixes,
 
 }  // namespace
 
-FixErrors compute_fix_errors_against_truth(const FileRows<FixRow>& fixes,
-                                           const FileRows<TruthRow>& truth, double radius_m) {
+FixErrors compare_with_truth(const FileRows<FixRow>& fixes, const FileRows<TruthRow>& truth,
+                             double radius_m) {
   const std::string hint =
       truth.rows.empty() ? "" : ", whose first is '" + truth.rows.front().image + "'";
   const std::vector<std::size_t> truth_rows =
@@ -157,7 +156,7 @@ FixErrors compute_fix_errors_against_truth(const FileRows<FixRow>& fixes,
   return result;
 }
 
-FixErrors compute_fix_errors_against_path(const std::vector<FixRow>& fixes, const Path& path) {
+FixErrors compare_with_path(const std::vector<FixRow>& fixes, const Path& path) {
   FixErrors result;
   result.captures = fixes.size();
   for (std::size_t i = 0; i < fixes.size(); ++i) {
@@ -166,7 +165,7 @@ FixErrors compute_fix_errors_against_path(const std::vector<FixRow>& fixes, cons
       continue;
     }
     const Eigen::Vector3d& place_m = fixes[i].fix->pose.position_m;
-    const PathPoint nearest = find_nearest_point_on_path(path, place_m.head<2>());
+    const PathPoint nearest = project_onto_path(path, place_m.head<2>());
     FixError error{i, place_m.head<2>() - nearest.xy_m, {}, {}, 0};
     if (nearest.z_m) error.height_m = place_m.z() - *nearest.z_m;
     result.errors.push_back(error);
@@ -176,7 +175,7 @@ FixErrors compute_fix_errors_against_path(const std::vector<FixRow>& fixes, cons
   return result;
 }
 
-void check_same_images_in_fixes(const FileRows<FixRow>& fixes, const FileRows<FixRow>& others) {
+void check_same_images(const FileRows<FixRow>& fixes, const FileRows<FixRow>& others) {
   const std::string question = "are both of the same captures?";
   match_rows(others, fixes, "", question);
   match_rows(fixes, others, "", question);

@@ -37,8 +37,7 @@ struct ErrorComponent {
 
 /// Collects `value_of(error)`, without the errors for which it returns std::nullopt.
 template <typename Value>
-ErrorComponent collect_values_and_clusters_of_fix_errors(const std::vector<FixError>& errors,
-                                                         const Value& value_of) {
+ErrorComponent collect_component(const std::vector<FixError>& errors, const Value& value_of) {
   ErrorComponent component;
   for (const FixError& error : errors) {
     const std::optional<double> value = value_of(error);
@@ -73,10 +72,10 @@ struct FileRows {
 /// `radius_m`.
 /// @throws InputError if images of the fixes are not in the ground truth, with the count and the
 /// line of the first; if the ground truth agrees with the fixes only in another unit, such as mm
-FixErrors compute_fix_errors_against_truth(const FileRows<FixRow>& fixes,
-                                           const FileRows<TruthRow>& truth, double radius_m);
+FixErrors compare_with_truth(const FileRows<FixRow>& fixes, const FileRows<TruthRow>& truth,
+                             double radius_m);
 
-/// Maximum number of clusters along a path, see compute_fix_errors_against_path().
+/// Maximum number of clusters along a path, see compare_with_path().
 inline constexpr std::size_t kPathRuns = 30;
 /// Computes errors against the nearest point of a path, seen from above. Errors along the path are
 /// not visible.
@@ -85,10 +84,10 @@ inline constexpr std::size_t kPathRuns = 30;
 /// fixes, because successive errors on a drive are correlated. If there are no more than kPathRuns
 /// fixes, each is a cluster. Source: non-overlapping batch means; Schmeiser, "Batch Size Effects in
 /// the Analysis of Simulation Output", 1982, recommends 10 to 30 batches.
-FixErrors compute_fix_errors_against_path(const std::vector<FixRow>& fixes, const Path& path);
+FixErrors compare_with_path(const std::vector<FixRow>& fixes, const Path& path);
 
 /// @throws InputError if the two files do not have rows of the same images, with the count and the
 /// line of the first
-void check_same_images_in_fixes(const FileRows<FixRow>& fixes, const FileRows<FixRow>& others);
+void check_same_images(const FileRows<FixRow>& fixes, const FileRows<FixRow>& others);
 
 }  // namespace vlp

@@ -56,7 +56,7 @@ using Source = FloorLimits::Source;
 constexpr Source kLampMap{"lamp map", "lamp_map"};
 
 /// Returns the sources that are independent between images.
-std::vector<Source> list_image_error_sources(const BodyPrior& prior) {
+std::vector<Source> list_image_sources(const BodyPrior& prior) {
   std::vector<Source> sources{{"noise", "noise"}};
   if (prior.is_motion_estimated()) sources.push_back({"motion", "motion"});
   if (prior.is_tilt_estimated()) sources.push_back({"roll and pitch", "roll_pitch"});
@@ -64,8 +64,7 @@ std::vector<Source> list_image_error_sources(const BodyPrior& prior) {
 }
 
 template <typename Budget>
-std::vector<Matrix4> split_covariance_by_image_source(const Budget& budget,
-                                                      const BodyPrior& prior) {
+std::vector<Matrix4> split_covariance(const Budget& budget, const BodyPrior& prior) {
   std::vector<Matrix4> parts{budget.noise};
   if (prior.is_motion_estimated()) parts.push_back(budget.motion);
   if (prior.is_tilt_estimated()) parts.push_back(budget.roll_pitch);
@@ -74,7 +73,7 @@ std::vector<Matrix4> split_covariance_by_image_source(const Budget& budget,
 
 }  // namespace
 
-FloorGrid make_grid_of_floor_positions(const LampMap& map, double step_m) {
+FloorGrid make_floor_grid(const LampMap& map, double step_m) {
   const Eigen::Vector3d& first = map.lamps.front().position_m;
   FloorGrid grid{first.x(), first.x(), first.y(), first.y(), step_m};
   for (const Lamp& lamp : map.lamps) {
@@ -86,11 +85,11 @@ FloorGrid make_grid_of_floor_positions(const LampMap& map, double step_m) {
   return grid;
 }
 
-std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera& camera,
-                                                const Pose& pose) {
+std::vector<Eigen::Vector3d> list_visible_positions(const LampMap& map, const Camera& camera,
+                                                    const Pose& pose) {
   return get_lamp_positions(
-      map, find_fully_visible_lamp_indices(map, Lens(camera.lens_model, camera.intrinsics),
-                                           camera.imager_px, Eigen::Matrix3d::Identity(), pose));
+      map, list_visible_lamps(map, Lens(camera.lens_model, camera.intrinsics), camera.imager_px,
+                              Eigen::Matrix3d::Identity(), pose));
 }
 
 Matrix4 FloorLimits::Position::total_pose_covariance() const {
@@ -99,47 +98,45 @@ Matrix4 FloorLimits::Position::total_pose_covariance() const {
   return sum;
 }
 
-FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& camera,
-                                             const FloorGrid& grid, double z_m, double yaw_rad,
-                                             const ErrorSources& sources, const BodyPrior& prior) {
+FloorLimits compute_floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
+                                 double z_m, double yaw_rad, const ErrorSources& sources,
+                                 const BodyPrior& prior) {
   const Lens lens(camera.lens_model, camera.intrinsics);
   const auto row_clock = make_readout_clock(camera);
-  FloorLimits limits{list_image_error_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
+  FloorLimits limits{list_image_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
   for (const auto& source :
        {Source{"principal point", "principal_point"}, {"tilt", "tilt"}, kLampMap}) {
     limits.sources.push_back(source);
   }
   for (FloorLimits::Position& place : limits.positions) {
-    const auto lamps = find_fully_visible_lamp_indices(map, lens, camera.imager_px,
-                                                       Eigen::Matrix3d::Identity(), place.camera);
+    const auto lamps =
+        list_visible_lamps(map, lens, camera.imager_px, Eigen::Matrix3d::Identity(), place.camera);
     place.lamps = static_cast<int>(lamps.size());
     const auto lamps_m = get_lamp_positions(map, lamps);
-    const auto budget =
-        compute_fix_error_budget(lamps_m, lens, place.camera, sources, prior, row_clock);
+    const auto budget = compute_fix_budget(lamps_m, lens, place.camera, sources, prior, row_clock);
     if (!budget) continue;
-    place.covariances = split_covariance_by_image_source(*budget, prior);
+    place.covariances = split_covariance(*budget, prior);
     place.covariances.insert(place.covariances.end(),
                              {budget->center, budget->tilt, budget->lamp_map});
   }
   return limits;
 }
 
-FloorLimits compute_accuracy_limits_on_floor(const UnitErrors& unit, const FloorGrid& grid,
-                                             double z_m, double yaw_rad, double noise_px,
-                                             const BodyPrior& prior) {
-  FloorLimits limits{list_image_error_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
+FloorLimits compute_floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m,
+                                 double yaw_rad, double noise_px, const BodyPrior& prior) {
+  FloorLimits limits{list_image_sources(prior), make_positions_on(grid, z_m, yaw_rad)};
   limits.sources.push_back({"lens", "lens"});
   limits.sources.push_back({"zenith", "zenith"});
-  if (unit.has_dispersion_offset_errors()) limits.sources.push_back({"offset", "offset"});
+  if (unit.has_offset_errors()) limits.sources.push_back({"offset", "offset"});
   limits.sources.push_back(kLampMap);
   for (FloorLimits::Position& place : limits.positions) {
-    const auto lamps = unit.find_fully_visible_lamp_indices(place.camera);
+    const auto lamps = unit.list_visible_lamps(place.camera);
     place.lamps = static_cast<int>(lamps.size());
-    const auto budget = unit.compute_unit_fix_error_budget(place.camera, lamps, noise_px, prior);
+    const auto budget = unit.compute_budget(place.camera, lamps, noise_px, prior);
     if (!budget) continue;
-    place.covariances = split_covariance_by_image_source(*budget, prior);
+    place.covariances = split_covariance(*budget, prior);
     place.covariances.insert(place.covariances.end(), {budget->lens, budget->zenith});
-    if (unit.has_dispersion_offset_errors()) place.covariances.push_back(budget->offset);
+    if (unit.has_offset_errors()) place.covariances.push_back(budget->offset);
     place.covariances.push_back(budget->lamp_map);
   }
   return limits;
@@ -152,7 +149,7 @@ struct MedianAndWorst {
 };
 
 /// @pre `values` is not empty
-MedianAndWorst find_median_and_worst(const std::vector<double>& values) {
+MedianAndWorst compute_median_and_worst(const std::vector<double>& values) {
   return {lower_median(values), *std::max_element(values.begin(), values.end())};
 }
 
@@ -171,8 +168,8 @@ FloorSummary::Row summarize_source(const FloorLimits::Source& source, const Floo
     part += spread.horizontal_m * spread.horizontal_m;
     whole += place.total_pose_covariance().topLeftCorner<2, 2>().trace();
   }
-  const auto h = find_median_and_worst(horizontal_m), z = find_median_and_worst(height_m),
-             yaw = find_median_and_worst(yaw_rad);
+  const auto h = compute_median_and_worst(horizontal_m), z = compute_median_and_worst(height_m),
+             yaw = compute_median_and_worst(yaw_rad);
   return {source, {h.median, z.median, yaw.median}, {h.worst, z.worst, yaw.worst}, part / whole};
 }
 
@@ -190,7 +187,7 @@ const FloorSummary::Row& FloorSummary::largest_error_source() const {
                            [](const Row& a, const Row& b) { return a.fraction < b.fraction; });
 }
 
-std::optional<FloorSummary> summarize_floor_limits(const FloorLimits& limits) {
+std::optional<FloorSummary> summarize_limits(const FloorLimits& limits) {
   const auto with_fix =
       std::count_if(limits.positions.begin(), limits.positions.end(),
                     [](const FloorLimits::Position& place) { return !place.covariances.empty(); });

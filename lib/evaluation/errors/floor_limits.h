@@ -27,7 +27,7 @@ struct FloorGrid {
 /// Returns a grid over the bounding rectangle of all lamp positions, parallel to the axes of the
 /// world, with the step `step_m`.
 /// @pre the map has lamps
-FloorGrid make_grid_of_floor_positions(const LampMap& map, double step_m);
+FloorGrid make_floor_grid(const LampMap& map, double step_m);
 
 /// Error budget of fixes at each position of a floor grid, by error source.
 struct FloorLimits {
@@ -54,8 +54,8 @@ struct FloorLimits {
 /// Returns the positions of the lamps that are fully visible to a level camera at `pose`. Such a
 /// lamp has its center, and its rim if the diameter is known, in front of the camera and within the
 /// image.
-std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera& camera,
-                                                const Pose& pose);
+std::vector<Eigen::Vector3d> list_visible_positions(const LampMap& map, const Camera& camera,
+                                                    const Pose& pose);
 
 /// Computes the error budget at every position of the grid, for a level camera at height `z_m` and
 /// yaw `yaw_rad`. Sources: noise, center, tilt, lamp map. Motion, then roll and pitch follow the
@@ -63,17 +63,15 @@ std::vector<Eigen::Vector3d> find_visible_lamps(const LampMap& map, const Camera
 /// @throws std::invalid_argument if the step is not positive; if the grid has no extent or more
 ///     than ten million positions; if the intrinsics do not match the lens model
 /// @pre the camera has row time and readout direction if it may move
-FloorLimits compute_accuracy_limits_on_floor(const LampMap& map, const Camera& camera,
-                                             const FloorGrid& grid, double z_m, double yaw_rad,
-                                             const ErrorSources& sources,
-                                             const BodyPrior& prior = {});
+FloorLimits compute_floor_limits(const LampMap& map, const Camera& camera, const FloorGrid& grid,
+                                 double z_m, double yaw_rad, const ErrorSources& sources,
+                                 const BodyPrior& prior = {});
 
 /// Computes the same for a calibrated camera with its tilt, from the reported uncertainties of
 /// calibration and lamp map. Sources: noise, motion, roll and pitch, lens, zenith, offset if there
 /// is one, lamp map.
-FloorLimits compute_accuracy_limits_on_floor(const UnitErrors& unit, const FloorGrid& grid,
-                                             double z_m, double yaw_rad, double noise_px,
-                                             const BodyPrior& prior = {});
+FloorLimits compute_floor_limits(const UnitErrors& unit, const FloorGrid& grid, double z_m,
+                                 double yaw_rad, double noise_px, const BodyPrior& prior = {});
 
 /// Standard deviations of a fix. `horizontal_m` is the root of the sum of the variances of x and y.
 /// Negative variances, which result from rounding, count as zero.
@@ -109,6 +107,6 @@ struct FloorSummary {
 };
 
 /// Computes the summary. Returns std::nullopt if no position has a fix.
-std::optional<FloorSummary> summarize_floor_limits(const FloorLimits& limits);
+std::optional<FloorSummary> summarize_limits(const FloorLimits& limits);
 
 }  // namespace vlp

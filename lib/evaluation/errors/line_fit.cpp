@@ -51,11 +51,11 @@ std::optional<LineFit> fit_line_to_fixes(const std::vector<FixRow>& fixes,
   for (int i = 0; i < kLineSamples; ++i) {
     const Eigen::Vector2d point_m =
         line_m[0] + i / double{kLineSamples - 1} * (line_m[1] - line_m[0]);
-    distances_m.push_back((point_m - find_nearest_point_on_path(path, point_m).xy_m).norm());
+    distances_m.push_back((point_m - project_onto_path(path, point_m).xy_m).norm());
   }
   return LineFit{line_m, std::atan2(cross(commanded, direction), commanded.dot(direction)),
                  std::sqrt(across_m2 / static_cast<double>(points_m.cols())),
-                 compute_error_statistics(distances_m), compute_error_percentiles(distances_m)};
+                 summarize_errors(distances_m), list_percentiles(distances_m)};
 }
 
 }  // namespace vlp

@@ -45,7 +45,7 @@ inline constexpr int kLineSamples = 1001;
 /// nearest point of the commanded line, which ends at the commanded ends.
 ///
 /// Averaging over a drive removes the jitter of single fixes from these statistics. Errors along
-/// the line are not visible: see also compute_fix_errors_against_path().
+/// the line are not visible: see also compare_with_path().
 ///
 /// Returns std::nullopt for fewer than two fixes, or if their distribution has no direction (larger
 /// eigenvalue less than twice the smaller).

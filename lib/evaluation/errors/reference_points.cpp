@@ -25,7 +25,7 @@ class ReferencePointTable {
 
   /// Returns the first reference point within the radius. A position without one becomes a new
   /// reference point.
-  std::size_t find_or_insert(const Eigen::Vector3d& place_m) {
+  std::size_t get_or_insert(const Eigen::Vector3d& place_m) {
     std::size_t found = firsts_m_.size();
     // The ball around a position covers one or two cells along each axis.
     const Cell low = ((place_m.array() - radius_m_) / cell_m_).floor();
@@ -52,7 +52,7 @@ class ReferencePointTable {
     std::uint64_t hash = 0;
     for (const double number : cell) {
       // + 0.0 turns a negative zero, which has other bits, into a positive one.
-      hash = hash_with_splitmix64(hash ^ std::bit_cast<std::uint64_t>(number + 0.0));
+      hash = hash_splitmix64(hash ^ std::bit_cast<std::uint64_t>(number + 0.0));
     }
     return hash;
   }
@@ -64,12 +64,12 @@ class ReferencePointTable {
 
 }  // namespace
 
-std::vector<std::size_t> assign_positions_to_reference_points(
-    std::span<const Eigen::Vector3d> places_m, double radius_m) {
+std::vector<std::size_t> group_positions(std::span<const Eigen::Vector3d> places_m,
+                                         double radius_m) {
   ReferencePointTable table(places_m.size(), radius_m);
   std::vector<std::size_t> points;
   points.reserve(places_m.size());
-  for (const Eigen::Vector3d& place_m : places_m) points.push_back(table.find_or_insert(place_m));
+  for (const Eigen::Vector3d& place_m : places_m) points.push_back(table.get_or_insert(place_m));
   return points;
 }
 

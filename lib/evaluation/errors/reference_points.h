@@ -18,7 +18,7 @@ namespace vlp {
 ///
 /// A position belongs to the first reference point whose first position is within `radius_m` of it,
 /// or else begins a new one. The time is proportional to the number of positions.
-std::vector<std::size_t> assign_positions_to_reference_points(
-    std::span<const Eigen::Vector3d> places_m, double radius_m);
+std::vector<std::size_t> group_positions(std::span<const Eigen::Vector3d> places_m,
+                                         double radius_m);
 
 }  // namespace vlp

@@ -153,9 +153,8 @@ std::string describe_positions(const FileRows<FixRow>& fixes, const FileRows<Tru
 }
 
 std::string describe_heights(const FileRows<TruthRow>& truth, const std::vector<FixError>& errors) {
-  auto errors_m = collect_values_and_clusters_of_fix_errors(errors, [](const FixError& error) {
-                    return error.height_m;
-                  }).values;
+  auto errors_m =
+      collect_component(errors, [](const FixError& error) { return error.height_m; }).values;
   if (errors_m.size() < kMinFixes) return "";
   const double offset_m = lower_median(errors_m);
   std::vector<double> remaining_m;

@@ -11,10 +11,10 @@
 
 namespace vlp {
 
-std::vector<std::size_t> find_fully_visible_lamp_indices(const LampMap& map, const Lens& lens,
-                                                         const std::array<int, 2>& imager_px,
-                                                         const Eigen::Matrix3d& camera_from_level,
-                                                         const Pose& level) {
+std::vector<std::size_t> list_visible_lamps(const LampMap& map, const Lens& lens,
+                                            const std::array<int, 2>& imager_px,
+                                            const Eigen::Matrix3d& camera_from_level,
+                                            const Pose& level) {
   const auto in_image = [&](const Eigen::Vector3d& x_in_world) {
     const auto pixel =
         lens.project_point(camera_from_level * level_point_from_world(level, x_in_world));
@@ -46,14 +46,14 @@ UnitErrors::UnitErrors(const LampMap& map, const Calibration& calibration)
              whole_.isolate_error_source(CommonErrorSource::lamps)},
       has_offset_(calibration.dispersion.has_value()) {}
 
-std::vector<std::size_t> UnitErrors::find_fully_visible_lamp_indices(const Pose& level) const {
-  return vlp::find_fully_visible_lamp_indices(map_, lens_, camera_.imager_px, camera_from_level_,
-                                              level);
+std::vector<std::size_t> UnitErrors::list_visible_lamps(const Pose& level) const {
+  return vlp::list_visible_lamps(map_, lens_, camera_.imager_px, camera_from_level_, level);
 }
 
-std::optional<UnitBudget> UnitErrors::compute_unit_fix_error_budget(
-    const Pose& level, std::span<const std::size_t> lamps, double noise_px,
-    const BodyPrior& prior) const {
+std::optional<UnitBudget> UnitErrors::compute_budget(const Pose& level,
+                                                     std::span<const std::size_t> lamps,
+                                                     double noise_px,
+                                                     const BodyPrior& prior) const {
   std::vector<Eigen::Vector3d> lamps_m;
   lamps_m.reserve(lamps.size());
   for (const std::size_t lamp : lamps) lamps_m.push_back(map_.lamps[lamp].position_m);
@@ -62,10 +62,10 @@ std::optional<UnitBudget> UnitErrors::compute_unit_fix_error_budget(
   if (!limit) return std::nullopt;
   const Eigen::Matrix3d body_from_base = Eigen::Matrix3d::Identity();
   const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
-  const auto gain = whole_.compute_gain_from_errors_to_fix<4>(
+  const auto gain = whole_.compute_fix_gain<4>(
       {limit->frame.observations_span(), lamps, lens_, body_from_base, no_arm_m}, limit->fix);
   const auto part = [&](CommonErrorSource of) {
-    return parts_[static_cast<std::size_t>(of)].propagate_covariance_to_fix(gain);
+    return parts_[static_cast<std::size_t>(of)].propagate(gain);
   };
   return UnitBudget{limit->noise,
                     part(CommonErrorSource::lens),

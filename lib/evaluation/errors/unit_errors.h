@@ -22,10 +22,10 @@ namespace vlp {
 /// Returns the indices in the map of the lamps that are fully visible to a camera with its level
 /// frame at `level`. Such a lamp has its center, and its outline if the size is known, above the
 /// camera and within the image. `camera_from_level` is the identity for a level camera.
-std::vector<std::size_t> find_fully_visible_lamp_indices(const LampMap& map, const Lens& lens,
-                                                         const std::array<int, 2>& imager_px,
-                                                         const Eigen::Matrix3d& camera_from_level,
-                                                         const Pose& level);
+std::vector<std::size_t> list_visible_lamps(const LampMap& map, const Lens& lens,
+                                            const std::array<int, 2>& imager_px,
+                                            const Eigen::Matrix3d& camera_from_level,
+                                            const Pose& level);
 
 /// Predicted covariances of the fix (X, Y, Z, yaw) of a calibrated camera, one per error source, in
 /// m and rad. `noise` is independent between images. `lens`, `zenith`, `offset` and `lamp_map` are
@@ -51,22 +51,20 @@ class UnitErrors {
   UnitErrors(const LampMap& map, const Calibration& calibration);
 
   const CommonErrors& common_errors() const { return whole_; }
-  bool has_dispersion_offset_errors() const { return has_offset_; }
+  bool has_offset_errors() const { return has_offset_; }
 
   /// Returns the indices in the map of the lamps that are fully visible to the camera with its
   /// calibrated tilt. `level` is the pose of its level frame. Such a lamp has its center, and its
   /// rim if the diameter is known, in the image.
-  std::vector<std::size_t> find_fully_visible_lamp_indices(const Pose& level) const;
+  std::vector<std::size_t> list_visible_lamps(const Pose& level) const;
 
   /// Computes the budget of a fix from these lamps, with noise `noise_px` per axis. The camera may
-  /// move and be tilted as in compute_fix_error_budget(). Agrees with the covariance of
+  /// move and be tilted as in compute_fix_budget(). Agrees with the covariance of
   /// Positioner::compute_position_fix(). Returns std::nullopt as compute_pose_crlb(), and for more
   /// than kMaxSightings lamps.
   /// @pre the calibration has row time and readout direction if the prior leaves the motion free
-  std::optional<UnitBudget> compute_unit_fix_error_budget(const Pose& level,
-                                                          std::span<const std::size_t> lamps,
-                                                          double noise_px,
-                                                          const BodyPrior& prior = {}) const;
+  std::optional<UnitBudget> compute_budget(const Pose& level, std::span<const std::size_t> lamps,
+                                           double noise_px, const BodyPrior& prior = {}) const;
 
  private:
   LampMap map_;

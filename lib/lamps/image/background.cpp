@@ -67,7 +67,7 @@ void for_each_sample(const ImageView& image, int width_px, Function&& function) 
 
 /// Returns the smallest difference between two levels: above 1 for images of 12 bits in 16, or of 8
 /// in 16. Returns 1 if few levels occur, which do not determine it.
-double find_level_step(const Histogram& sample) {
+double get_level_step(const Histogram& sample) {
   constexpr int sufficient_count = 16;
   int step = std::numeric_limits<int>::max(), levels = 0, before = 0;
   sample.for_each([&](int level, int) {
@@ -95,7 +95,7 @@ bool is_noise_clipped(const Histogram& sample, int median, double step) {
 /// Estimates the noise from the pixels above the median. 20 % of them are brighter than 0.84
 /// standard deviations, and 10 % than 1.28. If this many pixels are lit, the estimate is too large,
 /// so the smaller one is used.
-double estimate_noise_above_median(const Histogram& sample, int median) {
+double estimate_noise_above(const Histogram& sample, int median) {
   const auto above = [&](int per_cent) {
     const auto rank = std::int64_t{sample.count_samples()} * per_cent / 100;
     return double(sample.level_at(static_cast<int>(rank)) - median);
@@ -105,7 +105,7 @@ double estimate_noise_above_median(const Histogram& sample, int median) {
 
 /// Returns the highest level of the darker of two classes, between which the variance is largest
 /// (Otsu 1979).
-int find_max_dark_level(const Histogram& sample) {
+int compute_max_dark_level(const Histogram& sample) {
   const double count = sample.count_samples();
   double sum = 0, dark_sum = 0, dark_count = 0, largest = -1;
   int max_dark_level = 0;
@@ -121,7 +121,7 @@ int find_max_dark_level(const Histogram& sample) {
 }
 
 Background estimate_background(const Histogram& sample) {
-  const double step = find_level_step(sample);
+  const double step = get_level_step(sample);
   const int half = sample.count_samples() / 2, median = sample.level_at(half);
   // Lit pixels are above the median; the pixels below contain only noise.
   double squares = 0;
@@ -130,7 +130,7 @@ Background estimate_background(const Histogram& sample) {
   });
   double noise = std::sqrt(squares / std::max(1, half));
   const bool no_noise_below = is_noise_clipped(sample, median, step);
-  if (no_noise_below) noise = std::max(noise, estimate_noise_above_median(sample, median));
+  if (no_noise_below) noise = std::max(noise, estimate_noise_above(sample, median));
   // Gray levels are coarse: mean and scatter of the surrounding levels are more precise.
   constexpr double around = 3;
   const double min_noise = 0.3 * step;
@@ -151,21 +151,21 @@ Background estimate_background(const Histogram& sample) {
 
 }  // namespace
 
-Background estimate_image_background(const ImageView& image) {
+Background estimate_background_of(const ImageView& image) {
   Histogram sample(image.get_max_gray_level() + 1);
   for_each_sample(image, 1, [&](int level, int) { sample.add(level); });
   if (sample.count_samples() == 0) sample.add(image.gray_level_at_pixel(0, 0));
   return estimate_background(sample);
 }
 
-std::optional<Background> estimate_background_behind_lights(const ImageView& image) {
+std::optional<Background> estimate_dark_background(const ImageView& image) {
   // Means of four pixels average the mosaic of a color filter and most of the noise.
   constexpr int mean_px = 4;
   constexpr int min_lit_per_cent = 5;
   Histogram means(image.get_max_gray_level() + 1), dark_sample = means;
   for_each_sample(image, mean_px, [&](int, int mean) { means.add(mean); });
   if (means.count_samples() == 0) return std::nullopt;
-  const int max_dark_level = find_max_dark_level(means);
+  const int max_dark_level = compute_max_dark_level(means);
   for_each_sample(image, mean_px, [&](int level, int mean) {
     if (mean <= max_dark_level) dark_sample.add(level);
   });

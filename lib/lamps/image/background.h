@@ -23,13 +23,13 @@ struct Background {
 };
 
 /// Estimates dark level, noise and threshold of an image. @pre The image is not empty.
-Background estimate_image_background(const ImageView& image);
+Background estimate_background_of(const ImageView& image);
 
 /// Estimates the background of an image that lights cover by more than half, where the median is a
 /// lit level. Uses the darker one of two classes of pixels (Otsu 1979). Returns std::nullopt if
 /// less than 5 % of the image is brighter than the threshold of this class, as in an image of
 /// noise.
 /// @pre The image is not empty.
-std::optional<Background> estimate_background_behind_lights(const ImageView& image);
+std::optional<Background> estimate_dark_background(const ImageView& image);
 
 }  // namespace vlp

@@ -28,7 +28,7 @@ Rows<Level> get_rows_from(const ImageView& image, int first) {
 /// Returns the brightest level in a range of columns. Has no branches, so that it is compiled to
 /// vector instructions.
 template <typename Level>
-Level find_brightest_level(const Rows<Level>& rows, int begin, int count) {
+Level get_brightest_level(const Rows<Level>& rows, int begin, int count) {
   const auto [a, b, c, d, e, f, g, h, l] = rows;
   Level brightest = 0;
   for (int i = begin; i < begin + count; ++i) {
@@ -48,10 +48,10 @@ void search(const ImageView& image, Level threshold, TileMask& found) {
     const Rows<Level> rows = get_rows_from<Level, 2>(image, top - top / span % 2);
     auto* marks = found.tile_row(top / kTile_px);
     for (int tile = 0; tile < whole; ++tile) {
-      if (find_brightest_level(rows, tile * kTile_px, kTile_px) > threshold) marks[tile] = 1;
+      if (get_brightest_level(rows, tile * kTile_px, kTile_px) > threshold) marks[tile] = 1;
     }
     const int begin = whole * kTile_px, remaining_px = image.width - begin;
-    if (remaining_px > 0 && find_brightest_level(rows, begin, remaining_px) > threshold)
+    if (remaining_px > 0 && get_brightest_level(rows, begin, remaining_px) > threshold)
       marks[whole] = 1;
   }
 }
@@ -62,7 +62,7 @@ std::uint8_t count_above(const ImageView& image, const PixelBox& box, Level thre
   std::ptrdiff_t count = 0;
   for (int top = box.y; top < box.end_row() && count < 2; top += kRowsAtOnce) {
     const auto rows = get_rows_from<Level, 1>(image, top);
-    if (find_brightest_level(rows, box.x, box.width) <= threshold) continue;
+    if (get_brightest_level(rows, box.x, box.width) <= threshold) continue;
     for (int y = top; y < std::min(top + kRowsAtOnce, box.end_row()); ++y) {
       const Level* row = image.row_pixels<Level>(y);
       count += std::count_if(row + box.x, row + box.end_column(),
@@ -95,13 +95,13 @@ int count_tiles_for(int pixels) { return (pixels + kTile_px - 1) / kTile_px; }
 
 }  // namespace
 
-PixelBox pixel_box_from_tile_box(const PixelBox& tiles, const ImageSize& size) {
+PixelBox pixels_from_tiles(const PixelBox& tiles, const ImageSize& size) {
   return intersect_boxes(
       {tiles.x * kTile_px, tiles.y * kTile_px, tiles.width * kTile_px, tiles.height * kTile_px},
       {0, 0, size.width, size.height});
 }
 
-TileMask find_bright_tiles(const ImageView& image, double threshold) {
+TileMask mark_bright_tiles(const ImageView& image, double threshold) {
   TileMask found(count_tiles_for(image.width), count_tiles_for(image.height));
   if (threshold >= image.get_max_gray_level()) return found;
   TileMask counts = found, lit = found;
@@ -109,7 +109,7 @@ TileMask find_bright_tiles(const ImageView& image, double threshold) {
     const auto level = static_cast<decltype(type)>(threshold);
     search(image, level, found);
     for_each_nonzero_tile(dilate_tile_mask(found), [&](int column, int row) {
-      const PixelBox box = pixel_box_from_tile_box({column, row, 1, 1}, image.size());
+      const PixelBox box = pixels_from_tiles({column, row, 1, 1}, image.size());
       counts.tile_row(row)[column] = count_above(image, box, level);
     });
   });
@@ -130,7 +130,7 @@ TileMask dilate_tile_mask(const TileMask& mask) {
   return result;
 }
 
-TileMask transpose_tile_mask(const TileMask& mask) {
+TileMask transpose_tiles(const TileMask& mask) {
   TileMask result(mask.rows, mask.columns);
   for_each_nonzero_tile(mask, [&](int column, int row) {
     result.tile_row(column)[row] = mask.tile_row(row)[column];
@@ -138,7 +138,7 @@ TileMask transpose_tile_mask(const TileMask& mask) {
   return result;
 }
 
-std::vector<PixelBox> find_tile_group_boxes(TileMask mask) {
+std::vector<PixelBox> list_tile_boxes(TileMask mask) {
   std::vector<PixelBox> boxes;
   std::vector<std::pair<int, int>> open;
   const auto visit_tile = [&](int x, int y) {

@@ -38,17 +38,17 @@ struct TileMask {
 /// every row of the tiles with light and of their neighbors. A light is found if two consecutive
 /// rows are lit. A light with single-row stripes at an even period is guaranteed to be found if its
 /// height is at least 16 rows and a period. Identification of a lamp needs at least 8 lit lines.
-TileMask find_bright_tiles(const ImageView& image, double threshold);
+TileMask mark_bright_tiles(const ImageView& image, double threshold);
 
 /// Returns the mask with all eight neighbors of its nonzero tiles added.
 TileMask dilate_tile_mask(const TileMask& mask);
 
-TileMask transpose_tile_mask(const TileMask& mask);
+TileMask transpose_tiles(const TileMask& mask);
 
 /// Returns the bounding boxes, in tiles, of the 8-connected groups of nonzero tiles.
-std::vector<PixelBox> find_tile_group_boxes(TileMask mask);
+std::vector<PixelBox> list_tile_boxes(TileMask mask);
 
 /// Converts a box of tiles to a box of pixels, clipped to an image of `size`.
-PixelBox pixel_box_from_tile_box(const PixelBox& tiles, const ImageSize& size);
+PixelBox pixels_from_tiles(const PixelBox& tiles, const ImageSize& size);
 
 }  // namespace vlp

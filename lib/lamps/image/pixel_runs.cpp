@@ -44,8 +44,8 @@ void add_runs_of_row(const Level* pixels, int columns, int row, Level threshold,
 }
 
 template <typename Level>
-std::vector<PixelRun> find_pixel_runs_above(const ImageView& image, Level threshold,
-                                            const TileMask& lit) {
+std::vector<PixelRun> list_runs_above(const ImageView& image, Level threshold,
+                                      const TileMask& lit) {
   std::vector<PixelRun> runs;
   std::vector<int> tiles;
   for (int top = 0; top < image.height; top += kTile_px) {
@@ -99,23 +99,22 @@ PixelBox Blob::blob_bounding_box() const {
   return {begin, first_blob_row(), end - begin, last_blob_row() + 1 - first_blob_row()};
 }
 
-double mean_level_of_pixel_run(const ImageView& image, const PixelRun& run) {
+double mean_level(const ImageView& image, const PixelRun& run) {
   return visit_levels(image, [&](auto level) {
     const auto* row = image.row_pixels<decltype(level)>(run.row);
     return std::accumulate(row + run.begin, row + run.end, 0.0) / run.pixel_run_width_px();
   });
 }
 
-std::vector<PixelRun> find_pixel_runs(const ImageView& image, double threshold,
+std::vector<PixelRun> list_pixel_runs(const ImageView& image, double threshold,
                                       const TileMask& lit) {
   if (threshold >= image.get_max_gray_level()) return {};
   return visit_levels(image, [&](auto level) {
-    return find_pixel_runs_above(image, static_cast<decltype(level)>(threshold), lit);
+    return list_runs_above(image, static_cast<decltype(level)>(threshold), lit);
   });
 }
 
-std::vector<Blob> group_pixel_runs_into_blobs(const std::vector<PixelRun>& runs,
-                                              int max_dark_rows) {
+std::vector<Blob> group_into_blobs(const std::vector<PixelRun>& runs, int max_dark_rows) {
   std::vector<Growing> growing;
   std::vector<Blob> done;
   const auto retire = [&](int row) {

@@ -19,12 +19,12 @@ struct PixelRun {
 
 /// Returns the mean gray level of the pixels of a run. The dark level is not subtracted.
 /// @pre The run is not empty and lies in the image.
-double mean_level_of_pixel_run(const ImageView& image, const PixelRun& run);
+double mean_level(const ImageView& image, const PixelRun& run);
 
 /// Finds the runs of pixels above `threshold`, row by row. Gaps of up to two pixels do not end a
 /// run; runs of less than three pixels are discarded as noise. Searches the nonzero tiles of `lit`,
 /// or all tiles if `lit` is empty.
-std::vector<PixelRun> find_pixel_runs(const ImageView& image, double threshold,
+std::vector<PixelRun> list_pixel_runs(const ImageView& image, double threshold,
                                       const TileMask& lit = {});
 
 /// Runs of one light: they overlap from row to row, across up to `max_dark_rows` dark rows. Lights
@@ -37,6 +37,6 @@ struct Blob {
   PixelBox blob_bounding_box() const;
 };
 
-std::vector<Blob> group_pixel_runs_into_blobs(const std::vector<PixelRun>& runs, int max_dark_rows);
+std::vector<Blob> group_into_blobs(const std::vector<PixelRun>& runs, int max_dark_rows);
 
 }  // namespace vlp

@@ -39,10 +39,10 @@ std::shared_ptr<void> allocate_black_image(const ImageSize& size, int bits) {
 /// of the group.
 template <typename Level>
 void fill_around_lit_tiles(const TileMask& lit, Level level, const Pixels<Level>& pixels) {
-  for (const PixelBox& tiles : find_tile_group_boxes(lit)) {
+  for (const PixelBox& tiles : list_tile_boxes(lit)) {
     const int size = std::max(tiles.width, tiles.height);
     if (size == 1) continue;  // the tiles around it are transposed
-    const PixelBox box = pixel_box_from_tile_box(
+    const PixelBox box = pixels_from_tiles(
         expand_and_clip_box(tiles, size, {lit.columns, lit.rows}), {pixels.width, pixels.height});
     for (int y = box.y; y < box.end_row(); ++y)
       std::fill_n(pixels.row(y) + box.x, box.width, level);
@@ -71,22 +71,22 @@ void fill_scanlines(const ImageView& image, const TileMask& lit, double dark,
   for (int row = 0; row < turned.rows; ++row) {
     for (int column = 0; column < turned.columns; ++column) {
       if (turned.tile_row(row)[column] == 0) continue;
-      transpose(image, pixel_box_from_tile_box({column, row, 1, 1}, image.size()), pixels);
+      transpose(image, pixels_from_tiles({column, row, 1, 1}, image.size()), pixels);
     }
   }
 }
 
 }  // namespace
 
-ScanlineImage make_scanline_image(const ImageView& image, Readout readout,
-                                  const Background& background) {
-  TileMask lit = find_bright_tiles(image, background.threshold);
+ScanlineImage make_scanlines(const ImageView& image, Readout readout,
+                             const Background& background) {
+  TileMask lit = mark_bright_tiles(image, background.threshold);
   if (readout == Readout::rows) return {image, std::move(lit), {}};
   ScanlineImage lines;
   lines.memory = allocate_black_image({image.height, image.width}, image.bits);
   lines.pixels = {lines.memory.get(), image.height, image.width,
                   std::ptrdiff_t(image.height) * (image.bits / 8), image.bits};
-  lines.lit = transpose_tile_mask(lit);
+  lines.lit = transpose_tiles(lit);
   visit_levels(image, [&](auto level) {
     fill_scanlines<decltype(level)>(image, lit, background.level, lines);
   });

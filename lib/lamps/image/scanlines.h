@@ -14,7 +14,7 @@ namespace vlp {
 /// Image whose rows are the scanlines, that is the rows or columns that the shutter reads.
 struct ScanlineImage {
   ImageView pixels;
-  /// Tiles of `pixels` that contain lit pixels (find_bright_tiles()); a search for runs can skip
+  /// Tiles of `pixels` that contain lit pixels (mark_bright_tiles()); a search for runs can skip
   /// the others.
   TileMask lit;
   /// Memory of `pixels` if it is not that of the input image.
@@ -26,7 +26,6 @@ struct ScanlineImage {
 /// the background's threshold. Transposing a large image completely takes longer than detecting its
 /// lamps. The tiles next to the transposed ones are filled with the background level. All other
 /// tiles are black; their memory is not touched.
-ScanlineImage make_scanline_image(const ImageView& image, Readout readout,
-                                  const Background& background);
+ScanlineImage make_scanlines(const ImageView& image, Readout readout, const Background& background);
 
 }  // namespace vlp

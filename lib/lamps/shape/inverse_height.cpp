@@ -47,8 +47,7 @@ std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPla
   return InverseHeight{middle->log_value, std::max(min_sd, 1 / largest)};
 }
 
-std::optional<InverseHeight> estimate_inverse_height_from_radii(
-    const std::vector<LampRadius>& radii) {
+std::optional<InverseHeight> fit_inverse_height(const std::vector<LampRadius>& radii) {
   constexpr std::size_t min_lamps = 3;
   constexpr double min_sd = 0.005, sd_per_median_deviation = 1.4826;
   std::vector<double> log_values;

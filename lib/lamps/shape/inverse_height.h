@@ -44,7 +44,6 @@ std::optional<InverseHeight> estimate_inverse_height(const std::vector<LampInPla
 /// Estimates the inverse height from the radii of lamps, as their median. Its standard deviation
 /// is the scatter of a single radius, and at least 0.5 %. Returns std::nullopt for fewer than
 /// three lamps.
-std::optional<InverseHeight> estimate_inverse_height_from_radii(
-    const std::vector<LampRadius>& radii);
+std::optional<InverseHeight> fit_inverse_height(const std::vector<LampRadius>& radii);
 
 }  // namespace vlp

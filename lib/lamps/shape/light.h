@@ -25,7 +25,7 @@ enum class LightKind {
 
 /// Reason for the class of a light: the check that rejected it as a lamp, or `identified`. The
 /// checks run in another order than that of the enumerators
-/// (LightDetector::identify_lamps_of_lights()).
+/// (LightDetector::identify_lamps()).
 enum class LightReason {
   identified,       ///< a lamp, possibly cut by the image border
   overexposed,      ///< steady: contrast below kMinContrast, most pixels at full scale
@@ -55,7 +55,7 @@ struct Light {
   /// Pixel (u, v) of the lamp's center.
   Eigen::Vector2d pixel;
   /// Standard deviation of `pixel` per axis, by the noise model in light_center_noise.h. Includes
-  /// predict_center_sd_without_lens_px() if the lens is unknown.
+  /// sd_without_lens_px() if the lens is unknown.
   double sigma_px;
   /// Radius in the image; for other shapes than discs the radius of the disc of equal area.
   double radius_px;

@@ -14,18 +14,16 @@
 #include "rig/detection.h"
 
 namespace vlp {
-Eigen::Vector2d LightShape::swap_image_and_scanline_axes(const Eigen::Vector2d& at) const {
+Eigen::Vector2d LightShape::swap_axes(const Eigen::Vector2d& at) const {
   return camera_.readout == Readout::rows ? at : Eigen::Vector2d(at.reverse());
 }
 
-std::vector<Eigen::Vector2d> LightShape::swap_image_and_scanline_axes(
-    std::vector<Eigen::Vector2d> points) const {
-  for (Eigen::Vector2d& point : points) point = swap_image_and_scanline_axes(point);
+std::vector<Eigen::Vector2d> LightShape::swap_axes(std::vector<Eigen::Vector2d> points) const {
+  for (Eigen::Vector2d& point : points) point = swap_axes(point);
   return points;
 }
 
-std::optional<Eigen::Vector2d> LightShape::level_plane_point_from_pixel(
-    const Eigen::Vector2d& pixel) const {
+std::optional<Eigen::Vector2d> LightShape::plane_from_pixel(const Eigen::Vector2d& pixel) const {
   if (!camera_.lens) return pixel;
   const auto ray = camera_.lens->unproject_pixel(pixel);
   if (!ray) return std::nullopt;
@@ -34,16 +32,15 @@ std::optional<Eigen::Vector2d> LightShape::level_plane_point_from_pixel(
   return level.head<2>() / level.z();
 }
 
-std::optional<Eigen::Vector2d> LightShape::pixel_from_level_plane_point(
-    const Eigen::Vector2d& plane) const {
+std::optional<Eigen::Vector2d> LightShape::pixel_from_plane(const Eigen::Vector2d& plane) const {
   if (!camera_.lens) return plane;
   return camera_.lens->project_point(camera_.level_from_camera.transpose() * plane.homogeneous());
 }
 
-bool LightShape::set_outline_of_light(const PlaneEllipse& outline, double radius_px,
-                                      MeasuredLight& light) const {
+bool LightShape::set_outline(const PlaneEllipse& outline, double radius_px,
+                             MeasuredLight& light) const {
   constexpr int num_points = 64;
-  const auto pixel = pixel_from_level_plane_point(outline.center);
+  const auto pixel = pixel_from_plane(outline.center);
   if (!pixel) return false;
   const Matrix2 rim_from_circle = outline.unit_from_plane.inverse();
   Eigen::AlignedBox2d box(*pixel);
@@ -51,7 +48,7 @@ bool LightShape::set_outline_of_light(const PlaneEllipse& outline, double radius
   for (int i = 0; i < num_points; ++i) {
     const double angle = 2 * std::numbers::pi / num_points * i;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim = pixel_from_level_plane_point(outline.center + rim_from_circle * direction);
+    const auto rim = pixel_from_plane(outline.center + rim_from_circle * direction);
     if (!rim) return false;
     box.extend(*rim);
     points.push_back(*rim);
@@ -64,41 +61,37 @@ bool LightShape::set_outline_of_light(const PlaneEllipse& outline, double radius
   return true;
 }
 
-Eigen::Vector2d LightShape::compute_scanline_gradient_wrt_position(const Circle& circle) const {
+Eigen::Vector2d LightShape::compute_scanline_gradient(const Circle& circle) const {
   const auto line = [&](double x, double y) {
-    const auto pixel =
-        pixel_from_level_plane_point(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
-    return pixel ? swap_image_and_scanline_axes(*pixel).y()
-                 : std::numeric_limits<double>::quiet_NaN();
+    const auto pixel = pixel_from_plane(circle.center + circle.radius / 2 * Eigen::Vector2d(x, y));
+    return pixel ? swap_axes(*pixel).y() : std::numeric_limits<double>::quiet_NaN();
   };
   return Eigen::Vector2d(line(1, 0) - line(-1, 0), line(0, 1) - line(0, -1)) / circle.radius;
 }
 
-Eigen::Vector2d LightShape::compute_center_offset_from_curved_scanlines(
+Eigen::Vector2d LightShape::compute_curved_line_offset(
     const Circle& circle, const Eigen::Vector2d& motion_per_line) const {
   constexpr int directions = 16;
-  const auto center = pixel_from_level_plane_point(circle.center);
+  const auto center = pixel_from_plane(circle.center);
   Eigen::Vector2d off = Eigen::Vector2d::Zero();
   for (int i = 0; i < directions; ++i) {
     const double angle = 2 * std::numbers::pi / directions * i;
     const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
-    const auto rim = pixel_from_level_plane_point(circle.center + circle.radius * direction);
+    const auto rim = pixel_from_plane(circle.center + circle.radius * direction);
     if (!center || !rim) return Eigen::Vector2d::Zero();
-    const double later =
-        swap_image_and_scanline_axes(*rim).y() - swap_image_and_scanline_axes(*center).y();
+    const double later = swap_axes(*rim).y() - swap_axes(*center).y();
     off += 2.0 / directions * motion_per_line.dot(direction) * later * direction;
   }
   return off;
 }
 
-void LightShape::correct_light_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
-                                          MeasuredLight& light) const {
+void LightShape::correct_light(const Oval& oval, const Eigen::Vector2d& motion_per_line,
+                               MeasuredLight& light) const {
   const auto estimate = light.outline_equations->solve_with_oval_prior(oval);
   if (!estimate) return;
   const Circle& circle = light.outline_equations->circle;
-  const auto pixel = pixel_from_level_plane_point(
-      circle.center + circle.radius * estimate->p.head<2>() -
-      compute_center_offset_from_curved_scanlines(circle, motion_per_line));
+  const auto pixel = pixel_from_plane(circle.center + circle.radius * estimate->p.head<2>() -
+                                      compute_curved_line_offset(circle, motion_per_line));
   if (!pixel) return;
   light.pixel = *pixel;
   const double sigma_px =

@@ -18,19 +18,19 @@ std::optional<double> limit_center_sd(double sigma_px) {
   return std::max(kMinSigma_px, sigma_px);
 }
 
-void add_error_to_center_sigma(double sd_px, Light& light) {
+void add_center_error(double sd_px, Light& light) {
   light.sigma_px = std::min(std::hypot(light.sigma_px, sd_px), kMaxSigma_px);
 }
 
-void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, MeasuredLight& light) {
+void add_hidden_end_error(double off, double tilt_sd, MeasuredLight& light) {
   constexpr double clear = 3;
   if (!(off > tilt_sd + clear * light.aspect_sd)) return;
   const double length_px =
       std::sqrt(std::numbers::pi * light.aspect) * light.radius_px;  // its area has that radius
-  add_error_to_center_sigma(off * length_px / 2 / std::numbers::sqrt2, light);
+  add_center_error(off * length_px / 2 / std::numbers::sqrt2, light);
 }
 
-double predict_center_sd_without_lens_px(const Light& light, const ImageSize& image) {
+double sd_without_lens_px(const Light& light, const ImageSize& image) {
   constexpr double max_lean_rad = rad_from_deg(10);
   if (light.outline_kind == LightOutline::rectangle) return 0;
   const double focal_px = std::hypot(image.width, image.height) / 2;

@@ -27,7 +27,7 @@ double compute_center_sd(const Matrix2& covariance);
 std::optional<double> limit_center_sd(double sigma_px);
 
 /// Adds an independent error of the center to Light::sigma_px, up to kMaxSigma_px.
-void add_error_to_center_sigma(double sd_px, Light& light);
+void add_center_error(double sd_px, Light& light);
 
 /// Adds the error of a partly hidden light to its sigma. If the aspect ratio differs from that of
 /// the lamp, an object may hide one end: the center of the visible part is offset by half of the
@@ -35,7 +35,7 @@ void add_error_to_center_sigma(double sd_px, Light& light);
 ///
 /// @param off      difference of the log aspect ratios of light and lamp
 /// @param tilt_sd  standard deviation of the log aspect ratio from an unknown tilt
-void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, MeasuredLight& light);
+void add_hidden_end_error(double off, double tilt_sd, MeasuredLight& light);
 
 /// Predicts the error of a lamp's center if the lens is unknown, as a standard deviation per axis,
 /// px. The cause is that the center of an outline is not the image of the lamp's center. Returns 0
@@ -56,6 +56,6 @@ void add_hidden_end_error_to_center_sigma(double off, double tilt_sd, MeasuredLi
 /// the image's diagonal. The camera is assumed to be tilted by 10 degrees. It is used as one
 /// standard deviation of the shift. Lenses of consumer cameras distort less, a fisheye of 180
 /// degrees up to 2.5 times as much.
-double predict_center_sd_without_lens_px(const Light& light, const ImageSize& image);
+double sd_without_lens_px(const Light& light, const ImageSize& image);
 
 }  // namespace vlp

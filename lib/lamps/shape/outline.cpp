@@ -34,8 +34,8 @@ std::optional<double> find_level_crossing(const ImageView& image, int row, int b
 
 }  // namespace
 
-std::vector<Eigen::Vector2d> find_blob_outline(const ImageView& image, const Blob& blob,
-                                               const Background& background) {
+std::vector<Eigen::Vector2d> trace_blob_outline(const ImageView& image, const Blob& blob,
+                                                const Background& background) {
   constexpr int min_width_px = 8, margin_px = 6;
   constexpr double min_fraction = 0.35;
   std::vector<double> levels;

@@ -20,7 +20,7 @@ namespace vlp {
 /// its stripes.
 ///
 /// @param image  image whose rows are the scanlines
-std::vector<Eigen::Vector2d> find_blob_outline(const ImageView& image, const Blob& blob,
-                                               const Background& background);
+std::vector<Eigen::Vector2d> trace_blob_outline(const ImageView& image, const Blob& blob,
+                                                const Background& background);
 
 }  // namespace vlp

@@ -200,16 +200,16 @@ class OutlineFitter {
     if (is_coarse_ || step_px >= kFarStep_px) return std::nullopt;
     auto fit = make_result();
     if (!fit) return fit;
-    if (step_px >= tolerance_px) fit->add_error_to_center(step_px);
+    if (step_px >= tolerance_px) fit->add_center_error(step_px);
     const double unevenness = compute_unevenness();
     if constexpr (!is_rectangle) {
       fit->unevenness = unevenness;
       fit->level = compute_median_level();
     }
     if (unevenness < kMinUnevenness) return fit;
-    const auto shift_px = measure_shift_in_narrow_band_px();
+    const auto shift_px = measure_shift_px();
     if (!shift_px) return std::nullopt;
-    fit->add_error_to_center(*shift_px);
+    fit->add_center_error(*shift_px);
     return fit;
   }
 
@@ -226,7 +226,7 @@ class OutlineFitter {
       if (!update_samples()) return kFarStep_px;
       if (is_first_round_) initialize_levels();
       is_first_round_ = false;
-      if (!accumulate_products()) return kFarStep_px;
+      if (!accumulate()) return kFarStep_px;
       step_px = take_step();
       if (!std::isfinite(step_px) || is_far_from_start()) return kFarStep_px;
       if (!is_coarse_ && step_px < tolerance_px) break;
@@ -268,14 +268,14 @@ class OutlineFitter {
   /// Returns the distance of the center from that of a fit in a narrower band. Levels that do not
   /// vary linearly with the depth shift the outline by a distance that depends on the band. Returns
   /// std::nullopt if the narrower band does not determine the outline.
-  std::optional<double> measure_shift_in_narrow_band_px() {
+  std::optional<double> measure_shift_px() {
     constexpr double narrow_band = 0.65;
     constexpr int rounds = 2;
     const Outline outline = outline_;
     band_ = narrow_band;
     levels_.clear();
     for (int round = 0; round < rounds; ++round) {
-      if (!update_samples() || !accumulate_products() || !std::isfinite(take_step())) {
+      if (!update_samples() || !accumulate() || !std::isfinite(take_step())) {
         return std::nullopt;
       }
     }
@@ -516,7 +516,7 @@ class OutlineFitter {
 
   /// Solves for the levels of all cells, and sums the products of their derivatives. Returns false
   /// if the levels are not finite.
-  bool accumulate_products() {
+  bool accumulate() {
     compute_coverages();
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       if (cells_[i].size() > 0 && !solve_cell(i)) return false;
@@ -1108,18 +1108,18 @@ class OutlineFitter {
 
 /// Returns the box of the pixels that may be near an outline, of which `center_px` is the image of
 /// the center; an empty box if the lens does not cover the outline.
-PixelBox find_box_of_outline(const PlaneEllipse& outline, const Eigen::Vector2d& center_px,
+PixelBox compute_outline_box(const PlaneEllipse& outline, const Eigen::Vector2d& center_px,
                              double margin_px, const ImageSize& size, const LightShape& shape) {
   constexpr double margin = 1.2;
   const Matrix2 rim_from_circle = outline.unit_from_plane.inverse();
   Eigen::Vector2d low = center_px, high = center_px;
   for (int i = 0; i < 16; ++i) {
     const double angle = std::numbers::pi / 8 * i;
-    const auto rim = shape.pixel_from_level_plane_point(
+    const auto rim = shape.pixel_from_plane(
         outline.center + rim_from_circle * Eigen::Vector2d(std::cos(angle), std::sin(angle)));
     if (!rim) return {};
-    low = low.cwiseMin(shape.swap_image_and_scanline_axes(*rim));
-    high = high.cwiseMax(shape.swap_image_and_scanline_axes(*rim));
+    low = low.cwiseMin(shape.swap_axes(*rim));
+    high = high.cwiseMax(shape.swap_axes(*rim));
   }
   const Eigen::Vector2d middle = (low + high) / 2,
                         half = margin * (high - low) / 2 + Eigen::Vector2d::Constant(margin_px);
@@ -1133,7 +1133,7 @@ PixelBox find_box_of_outline(const PlaneEllipse& outline, const Eigen::Vector2d&
 
 }  // namespace
 
-void OutlineFit::add_error_to_center(double sd_px) {
+void OutlineFit::add_center_error(double sd_px) {
   const double total_px = std::hypot(center_sd_px, sd_px);
   const double ratio = std::pow(center_sd_px / total_px, 2);
   center_sd_px = total_px;
@@ -1174,11 +1174,11 @@ std::optional<typename Shape::Fit> fit_outline(const ImageView& lines,
                                                const LightShape& shape, const Priors& priors) {
   constexpr double min_margin_px = 6, margin_blurs = 3.5;
   constexpr int min_size_px = 8;
-  const auto center = shape.pixel_from_level_plane_point(start.center);
+  const auto center = shape.pixel_from_plane(start.center);
   if (!center) return std::nullopt;
-  const Eigen::Vector2d center_px = shape.swap_image_and_scanline_axes(*center);
+  const Eigen::Vector2d center_px = shape.swap_axes(*center);
   const PixelBox box =
-      find_box_of_outline(around, center_px, std::max(min_margin_px, margin_blurs * start_blur_px),
+      compute_outline_box(around, center_px, std::max(min_margin_px, margin_blurs * start_blur_px),
                           lines.size(), shape);
   if (std::min(box.width, box.height) < min_size_px) return std::nullopt;
   const auto patch = PlanePatch::fit(shape, box);
@@ -1216,7 +1216,7 @@ std::optional<RectangleFit> fit_rectangle_outline(const ImageView& lines, const 
     priors.sizes_m = sizes_m;
   } else {
     const double focal_px = middle.norm();
-    rectangle.off_axis = start.center - shape.swap_image_and_scanline_axes(middle);
+    rectangle.off_axis = start.center - shape.swap_axes(middle);
     priors.shear_sd = no_lens_sd;
     priors.keystone_sd = no_lens_sd / focal_px * half_sides;
     priors.distortion_sd = 1 / (3 * focal_px * focal_px);
@@ -1267,8 +1267,8 @@ Eigen::Vector2d PlaneRectangle::plane_point_from_unit(const Eigen::Vector2d& uni
 bool set_fitted_outline(OutlineFit fit, const LightShape& shape, MeasuredLight& light) {
   constexpr double rim_error = 0.0005, min_unevenness = 0.03;  // in radii; of rims with this error
   if (light.has_bright_core || fit.unevenness > min_unevenness)
-    fit.add_error_to_center(rim_error * fit.radius_px);
-  if (!shape.set_outline_of_light(fit.outline, fit.radius_px, light)) return false;
+    fit.add_center_error(rim_error * fit.radius_px);
+  if (!shape.set_outline(fit.outline, fit.radius_px, light)) return false;
   light.outline_kind = light.has_bright_core || fit.unevenness > kMinUnevenness
                            ? LightOutline::rim
                            : LightOutline::edge;
@@ -1278,7 +1278,7 @@ bool set_fitted_outline(OutlineFit fit, const LightShape& shape, MeasuredLight& 
   if (shape.has_known_lens()) {
     const Circle circle{fit.outline.center, fit.outline.radius()};
     light.outline_equations = {circle, fit.matrix, fit.gradient,
-                               shape.compute_scanline_gradient_wrt_position(circle)};
+                               shape.compute_scanline_gradient(circle)};
   }
   return true;
 }

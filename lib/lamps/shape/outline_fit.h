@@ -31,7 +31,7 @@ struct OutlineFit {
   OutlineEquations::Vector5 gradient;
 
   /// Adds an independent error of the center, as a standard deviation per axis.
-  void add_error_to_center(double sd_px);
+  void add_center_error(double sd_px);
 };
 
 /// Ratio of Light::rise_px and the blur: distance of the quartiles of a normal distribution.
@@ -125,7 +125,7 @@ struct RectangleFit {
   /// distortion, in pixels.
   Eigen::Matrix<double, 9, 9> covariance_px;
 
-  void add_error_to_center(double sd_px) { center_sd_px = std::hypot(center_sd_px, sd_px); }
+  void add_center_error(double sd_px) { center_sd_px = std::hypot(center_sd_px, sd_px); }
 };
 
 /// Change of the log aspect ratio of a rectangle that an unknown tilt of 5 degrees causes, 35

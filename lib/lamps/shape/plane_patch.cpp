@@ -26,7 +26,7 @@ Nodes compute_nodes() {
 
 /// Returns the matrix that computes the coefficients from the values at the nodes.
 template <int Degree, int Terms>
-Eigen::Matrix<double, Terms, kNodes> make_least_squares_solver(const Nodes& nodes) {
+Eigen::Matrix<double, Terms, kNodes> make_solver(const Nodes& nodes) {
   Eigen::Matrix<double, kNodes, Terms> values;
   for (int node = 0; node < kNodes; ++node) {
     const Eigen::Vector2d& at = nodes[std::size_t(node)];
@@ -43,23 +43,23 @@ Eigen::Matrix<double, Terms, kNodes> make_least_squares_solver(const Nodes& node
 
 std::optional<PlanePatch> PlanePatch::fit(const LightShape& shape, const PixelBox& box) {
   static const Nodes nodes = compute_nodes();
-  static const auto solver = make_least_squares_solver<kMaxDegree, kTerms>(nodes);
+  static const auto solver = make_solver<kMaxDegree, kTerms>(nodes);
   PlanePatch patch;
   patch.middle_ = {box.x + (box.width - 1) / 2.0, box.y + (box.height - 1) / 2.0};
   patch.half_ = Eigen::Vector2d(box.width, box.height) / 2;
   Eigen::Matrix<double, kNodes, 2> values;
   for (int i = 0; i < kNodes; ++i) {
     const Eigen::Vector2d pixel = patch.middle_ + patch.half_.cwiseProduct(nodes[std::size_t(i)]);
-    const auto at = shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(pixel));
+    const auto at = shape.plane_from_pixel(shape.swap_axes(pixel));
     if (!at) return std::nullopt;
     values.row(i) = *at;
   }
   patch.coefficients_ = solver * values;
-  patch.degree_ = patch.find_sufficient_degree();
+  patch.degree_ = patch.select_degree();
   return patch;
 }
 
-int PlanePatch::find_sufficient_degree() const {
+int PlanePatch::select_degree() const {
   constexpr double max_error_px = 1e-4;
   // Sums of the terms of each degree: the largest error without them.
   std::array<double, kMaxDegree + 1> sums{};

@@ -43,7 +43,7 @@ class PlanePatch {
   };
 
  private:
-  int find_sufficient_degree() const;
+  int select_degree() const;
 
   Eigen::Vector2d middle_, half_;
   int degree_;

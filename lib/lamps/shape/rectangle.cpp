@@ -90,7 +90,7 @@ double compute_aspect(const Sides& sides) {
 
 /// Computes the minimum-area rectangle around the points, with the light on the left of its sides:
 /// tries directions 3 degrees apart, and then halves this step.
-Corners fit_min_area_rectangle(const std::vector<Eigen::Vector2d>& points) {
+Corners fit_min_rectangle(const std::vector<Eigen::Vector2d>& points) {
   constexpr double coarse_rad = rad_from_deg(3), fine_rad = 1e-4;
   const auto box_at = [&](double angle_rad) {
     const Eigen::Rotation2Dd turn(-angle_rad);
@@ -121,7 +121,7 @@ double distance_outside_px(const Side& side, const Eigen::Vector2d& point) {
   return std::abs((point - side.from).dot(side.inward_normal()));
 }
 
-std::size_t find_nearest_side(const Sides& sides, const Eigen::Vector2d& point) {
+std::size_t get_nearest_side(const Sides& sides, const Eigen::Vector2d& point) {
   const auto closer = [&](const Side& a, const Side& b) {
     return distance_outside_px(a, point) < distance_outside_px(b, point);
   };
@@ -137,7 +137,7 @@ Sides fit_sides(const std::vector<Eigen::Vector2d>& points, Sides sides, double 
   const Sides before = sides;
   std::array<std::vector<Eigen::Vector2d>, 4> side_points;
   for (const Eigen::Vector2d& point : points) {
-    const std::size_t i = find_nearest_side(before, point);
+    const std::size_t i = get_nearest_side(before, point);
     if (distance_outside_px(before[i], point) < within) side_points[i].push_back(point);
   }
   for (std::size_t i = 0; i < 4; ++i) {
@@ -149,7 +149,7 @@ Sides fit_sides(const std::vector<Eigen::Vector2d>& points, Sides sides, double 
     for (const Eigen::Vector2d& point : side_points[i]) {
       spread += (point - mean) * (point - mean).transpose();
     }
-    const auto axes = eigendecompose_symmetric_matrix(spread);
+    const auto axes = eigendecompose(spread);
     Eigen::Vector2d direction = axes.vectors.col(1);
     const double length = std::sqrt(axes.values[1] / double(side_points[i].size()) * 12);
     if (length < min_spread * (sides[i].to - sides[i].from).norm()) continue;
@@ -170,7 +170,7 @@ std::optional<FirstCorners> find_first_corners(const std::vector<Eigen::Vector2d
                                                double per_px) {
   constexpr double near_px = 2, min_fraction = 0.7;
   constexpr double coarse_fraction = 0.08;
-  Corners corners = fit_min_area_rectangle(points);
+  Corners corners = fit_min_rectangle(points);
   const double size = std::min((corners[1] - corners[0]).norm(), (corners[2] - corners[1]).norm());
   double within = std::max(4 * per_px, coarse_fraction * size);
   for (int iteration = 0; iteration < 3; ++iteration) {
@@ -182,7 +182,7 @@ std::optional<FirstCorners> find_first_corners(const std::vector<Eigen::Vector2d
   const Sides sides = make_sides(corners);
   if (!is_rectangular(sides)) return std::nullopt;
   const auto near = std::count_if(points.begin(), points.end(), [&](const Eigen::Vector2d& point) {
-    return distance_outside_px(sides[find_nearest_side(sides, point)], point) < near_px * per_px;
+    return distance_outside_px(sides[get_nearest_side(sides, point)], point) < near_px * per_px;
   });
   if (double(near) < min_fraction * double(points.size())) return std::nullopt;
   return FirstCorners{corners, double(near) / double(points.size())};
@@ -191,10 +191,9 @@ std::optional<FirstCorners> find_first_corners(const std::vector<Eigen::Vector2d
 /// Returns the corners of a slender rectangle whose sides an unknown lens curves. Tries many
 /// curvatures, straightens the points by each of them, which does not change the ends, and selects
 /// the best corners.
-std::optional<FirstCorners> find_corners_of_curved_sides(
-    const std::vector<Eigen::Vector2d>& points) {
+std::optional<FirstCorners> find_curved_corners(const std::vector<Eigen::Vector2d>& points) {
   constexpr double max_px = 6, step_px = 0.5, min_aspect = 3;
-  const Sides around = make_sides(fit_min_area_rectangle(points));
+  const Sides around = make_sides(fit_min_rectangle(points));
   if (compute_aspect(around) < min_aspect) return std::nullopt;
   const bool first =
       (around[0].to - around[0].from).norm() > (around[1].to - around[1].from).norm();
@@ -215,8 +214,8 @@ std::optional<FirstCorners> find_corners_of_curved_sides(
 
 /// Returns true if the outline extends into the corners, unlike that of a disc: the squared
 /// distance from the center is 1 on an ellipse inside the sides, and up to 2 on the sides.
-bool does_outline_reach_corners(const std::vector<Eigen::Vector2d>& points,
-                                const PlaneRectangle& rectangle) {
+bool has_corner_points(const std::vector<Eigen::Vector2d>& points,
+                       const PlaneRectangle& rectangle) {
   constexpr double beyond = 1.35, min_fraction = 0.1;
   const auto far = std::ranges::count_if(points, [&](const Eigen::Vector2d& at) {
     return rectangle.unit_from_plane_point(at).squaredNorm() > beyond;
@@ -244,7 +243,7 @@ std::vector<Eigen::Vector2d> make_polygon(const PlaneRectangle& rectangle, doubl
         to(corners[i + 1][0], corners[i + 1][1]);
     for (int piece = 0; piece < pieces; ++piece) {
       const Eigen::Vector2d at = (from + (to - from) * piece / pieces) * (1 - inset_px / half_px);
-      const auto pixel = shape.pixel_from_level_plane_point(rectangle.plane_point_from_unit(at));
+      const auto pixel = shape.pixel_from_plane(rectangle.plane_point_from_unit(at));
       if (!pixel) return {};
       face.push_back(*pixel);
     }
@@ -272,7 +271,7 @@ std::optional<MeasuredLight> make_light(const RectangleFit& fit, double per_px,
                                         const LightShape& shape) {
   constexpr double outlier_px = 3, max_outside = 0.25, blur_sd_fraction = 0.25;
   const PlaneRectangle& rectangle = fit.outline;
-  if (!does_outline_reach_corners(points, rectangle)) return std::nullopt;
+  if (!has_corner_points(points, rectangle)) return std::nullopt;
   const Eigen::Vector2d half_px = compute_half_sides_px(rectangle, per_px);
   const auto outliers = std::ranges::count_if(points, [&](const Eigen::Vector2d& at) {
     const Eigen::Vector2d u = rectangle.unit_from_plane_point(at);
@@ -280,7 +279,7 @@ std::optional<MeasuredLight> make_light(const RectangleFit& fit, double per_px,
   });
   if (double(outliers) > max_outside * double(points.size())) return std::nullopt;
   const auto pixel =
-      shape.pixel_from_level_plane_point(rectangle.plane_point_from_unit(Eigen::Vector2d::Zero()));
+      shape.pixel_from_plane(rectangle.plane_point_from_unit(Eigen::Vector2d::Zero()));
   const auto sigma_px = limit_center_sd(fit.center_sd_px);
   MeasuredLight light{};
   light.outline = make_polygon(rectangle, 0, per_px, shape);
@@ -314,14 +313,13 @@ struct PlaneOutline {
 };
 
 /// Returns std::nullopt if the plane does not cover a point of the outline.
-std::optional<PlaneOutline> project_outline_to_plane(const std::vector<Eigen::Vector2d>& outline,
-                                                     const LightShape& shape) {
+std::optional<PlaneOutline> project_outline(const std::vector<Eigen::Vector2d>& outline,
+                                            const LightShape& shape) {
   PlaneOutline result;
   result.points.reserve(outline.size());
   Eigen::AlignedBox2d in_plane, in_image;
   for (const Eigen::Vector2d& pixel : outline) {
-    const auto point =
-        shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(pixel));
+    const auto point = shape.plane_from_pixel(shape.swap_axes(pixel));
     if (!point) return std::nullopt;
     result.points.push_back(*point);
     in_plane.extend(*point);
@@ -335,14 +333,14 @@ std::optional<PlaneOutline> project_outline_to_plane(const std::vector<Eigen::Ve
 std::optional<FirstCorners> find_initial_corners(const PlaneOutline& outline, bool has_known_lens) {
   auto first = find_first_corners(outline.points, outline.per_px);
   if (has_known_lens) return first;
-  const auto curved = find_corners_of_curved_sides(outline.points);
+  const auto curved = find_curved_corners(outline.points);
   if (curved && (!first || curved->near > first->near)) first = curved;
   return first;
 }
 
 }  // namespace
 
-std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
+std::vector<PixelRun> list_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
                                              const ImageSize& size) {
   constexpr int min_px = 2;
   double top = size.height, bottom = -1;
@@ -379,7 +377,7 @@ std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const
   constexpr std::size_t min_points = 10;
   const PixelBox box = blob.blob_bounding_box();
   if (outline.size() < min_points || std::min(box.width, box.height) < min_px) return {};
-  const auto in_plane = project_outline_to_plane(outline, shape);
+  const auto in_plane = project_outline(outline, shape);
   if (!in_plane) return std::nullopt;
   const double per_px = in_plane->per_px;
   const auto first = find_initial_corners(*in_plane, shape.has_known_lens());
@@ -389,9 +387,8 @@ std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const
   half_sides << (corners[1] - corners[0]) / 2, (corners[3] - corners[0]) / 2;
   const PlaneEllipse start{(corners[0] + corners[1] + corners[2] + corners[3]) / 4,
                            half_sides.inverse()};
-  const auto chords = find_chords_in_polygon(shape.swap_image_and_scanline_axes(make_polygon(
-                                                 PlaneRectangle{start}, inset_px, per_px, shape)),
-                                             lines.size());
+  const auto chords = list_chords_in_polygon(
+      shape.swap_axes(make_polygon(PlaneRectangle{start}, inset_px, per_px, shape)), lines.size());
   const Stripes stripes =
       measure_stripes(compute_scanline_signal(lines, chords, background.level, false));
   if (stripes.contrast >= kMinContrast) period_lines = stripes.period_lines;

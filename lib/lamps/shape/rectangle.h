@@ -20,7 +20,7 @@ namespace vlp {
 ///
 /// @param lines         image whose rows are the scanlines
 /// @param blob          lit pixels of the light
-/// @param outline       result of find_blob_outline() for the blob, (column, row)
+/// @param outline       result of trace_blob_outline() for the blob, (column, row)
 /// @param period_lines  period of the stripes in scanlines, if those inside the first rectangle are
 ///     not clear
 /// @param sizes_m       lengths of both axes of the map's rectangles, used only for hidden sides
@@ -42,7 +42,7 @@ std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const
                                                    const std::vector<Eigen::Vector2d>& sizes_m);
 
 /// Returns the pixels inside a convex polygon, (column, row), on each line of an image of `size`.
-std::vector<PixelRun> find_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
+std::vector<PixelRun> list_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
                                              const ImageSize& size);
 
 }  // namespace vlp

@@ -48,10 +48,10 @@ std::optional<Matrix2> compute_plane_from_pixel(const LightShape& shape,
                                                 const Eigen::Vector2d& pixel) {
   constexpr double step_px = 1;
   Matrix2 derivative;
-  const auto at = shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(pixel));
+  const auto at = shape.plane_from_pixel(shape.swap_axes(pixel));
   for (int i = 0; i < 2; ++i) {
-    const auto beside = shape.level_plane_point_from_pixel(
-        shape.swap_image_and_scanline_axes(pixel + step_px * Eigen::Vector2d::Unit(i)));
+    const auto beside =
+        shape.plane_from_pixel(shape.swap_axes(pixel + step_px * Eigen::Vector2d::Unit(i)));
     if (!at || !beside) return std::nullopt;
     derivative.col(i) = (*beside - *at) / step_px;
   }
@@ -60,7 +60,7 @@ std::optional<Matrix2> compute_plane_from_pixel(const LightShape& shape,
 
 /// Returns the shape of a blob, scaled to an area of pi, from the second moments of its pixels:
 /// unit_from_pixel of the ellipse with these moments. Returns std::nullopt if it is nearly round.
-std::optional<Matrix2> compute_shape_of_blob(const Blob& blob) {
+std::optional<Matrix2> compute_blob_shape(const Blob& blob) {
   constexpr double min_axis_ratio = 1.15;
   double count = 0;
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
@@ -110,12 +110,12 @@ class Face {
     const double brightest = *std::max_element(levels_.begin(), levels_.end());
     soft_ = std::max(fraction * brightest, (background.threshold - background.level) / 2);
     compute_moving_means();
-    find_scanlines_of_bright_stripes(background.threshold - background.level, period_lines);
+    fill_bright_scanlines(background.threshold - background.level, period_lines);
   }
 
   const PixelBox& box() const { return box_; }
   /// Returns the scanlines of bright stripes.
-  const std::vector<int>& bright_stripe_scanlines() const { return lit_; }
+  const std::vector<int>& bright_scanlines() const { return lit_; }
   /// Returns the median of the bright levels of these scanlines, above the dark level.
   double bright_level() const { return bright_level_; }
   bool has(int column) const {
@@ -163,7 +163,7 @@ class Face {
 
   /// Finds the scanlines in the brighter half of the period. Compares phases, because next to a
   /// bright core the bright stripes of the rim are darker than the core is in a dark stripe.
-  void find_scanlines_of_bright_stripes(double min_level, double period_lines) {
+  void fill_bright_scanlines(double min_level, double period_lines) {
     LineProfile profile{double(box_.y), 1, {}};
     std::vector<double> brightest, lit_levels;
     std::vector<float> line;
@@ -202,7 +202,7 @@ class Steps {
  public:
   Steps(const Face& face, double max_step) : left_(face.box().x), width_(face.box().width) {
     constexpr std::size_t max_lines = 48;
-    const std::vector<int>& lit = face.bright_stripe_scanlines();
+    const std::vector<int>& lit = face.bright_scanlines();
     every_ = (lit.size() + max_lines - 1) / max_lines;
     for (std::size_t i = 0; i < lit.size(); i += every_) {
       lines_.push_back(lit[i]);
@@ -212,12 +212,12 @@ class Steps {
         }
       }
     }
-    compute_limits_below_lines();
+    fill_limits();
   }
 
   /// Returns the sum of e over the crossings of an ellipse with the lit scanlines, scaled to all of
   /// them; -infinity if it cannot be above `best`.
-  double sum_steps_along_ellipse(const Ellipse& ellipse, double best) const {
+  double sum_steps(const Ellipse& ellipse, double best) const {
     constexpr double max_height = 0.94;  // scanlines are nearly tangent above it
     const double min_sum = best / double(every_);
     double sum = 0;
@@ -239,7 +239,7 @@ class Steps {
   }
 
   /// Computes the largest possible sums of e over each line and the lines below it.
-  void compute_limits_below_lines() {
+  void fill_limits() {
     limits_.assign(lines_.size() + 1, 0);
     for (std::size_t line = lines_.size(); line-- > 0;) {
       std::array<double, 2> largest{};
@@ -259,8 +259,8 @@ class Steps {
 
 /// Returns the ring with the largest sum. Rings are circles in the level plane, whose derivative is
 /// `unit_plane_from_pixel`.
-Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_plane_from_pixel,
-                    const RadiusRange& range, double max_step) {
+Ring select_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_plane_from_pixel,
+                 const RadiusRange& range, double max_step) {
   constexpr double fine = 20, max_shift = 0.35;
   const Steps steps(face, max_step);
   const double size = std::max(blob.width, blob.height),
@@ -273,7 +273,7 @@ Ring find_best_ring(const Face& face, const PixelBox& blob, const Matrix2& unit_
       for (double dv = -max_shift_px; dv <= max_shift_px; dv += step) {
         for (double du = -max_shift_px; du <= max_shift_px; du += step) {
           const Ellipse ellipse{middle + Eigen::Vector2d(du, dv), unit_from_pixel};
-          const double sum = steps.sum_steps_along_ellipse(ellipse, best.sum);
+          const double sum = steps.sum_steps(ellipse, best.sum);
           if (sum > best.sum) best = {ellipse, sum};
         }
       }
@@ -315,29 +315,27 @@ std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob
   const int size = std::max(wide.width, wide.height),
             window = std::max(std::clamp(size / 30, 2, 6), size / 50);
   const Face face(image, wide, background, window, period_lines);
-  if (face.bright_stripe_scanlines().size() < min_lines) return std::nullopt;
+  if (face.bright_scanlines().size() < min_lines) return std::nullopt;
   // Without a lens the axis ratio of a disc is unknown.
   constexpr double min_oval_gain = 1.2;
   Matrix2 unit_from_pixel = *plane_from_pixel / plane_per_px;
   // The steps of a bright core must not exceed those of a dim rim of known radius.
   const double max_step = radius ? 0.5 : 1;
-  Ring best = find_best_ring(face, box, unit_from_pixel, range, max_step);
-  const auto blob_shape = shape.has_known_lens() ? std::nullopt : compute_shape_of_blob(blob);
+  Ring best = select_ring(face, box, unit_from_pixel, range, max_step);
+  const auto blob_shape = shape.has_known_lens() ? std::nullopt : compute_blob_shape(blob);
   if (blob_shape) {
-    const Ring oval = find_best_ring(face, box, *blob_shape, range, max_step);
+    const Ring oval = select_ring(face, box, *blob_shape, range, max_step);
     if (oval.sum > min_oval_gain * best.sum) {
       best = oval;
       unit_from_pixel = *blob_shape;
     }
   }
-  const auto crossings = 2 * std::count_if(face.bright_stripe_scanlines().begin(),
-                                           face.bright_stripe_scanlines().end(), [&](int line) {
-                                             return best.ellipse.intersect(line).has_value();
-                                           });
+  const auto crossings =
+      2 * std::count_if(face.bright_scanlines().begin(), face.bright_scanlines().end(),
+                        [&](int line) { return best.ellipse.intersect(line).has_value(); });
   if (!(best.sum > (radius ? min_known_step : min_step) * double(crossings))) return std::nullopt;
 
-  const auto center =
-      shape.level_plane_point_from_pixel(shape.swap_image_and_scanline_axes(best.ellipse.center));
+  const auto center = shape.plane_from_pixel(shape.swap_axes(best.ellipse.center));
   if (!center) return std::nullopt;
   const double ring_radius_px = 1 / std::sqrt(std::abs(best.ellipse.unit_from_pixel.determinant()));
   const auto fit = fit_disc_outline(

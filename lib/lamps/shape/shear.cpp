@@ -52,7 +52,7 @@ double estimate_variance_ratio(const std::vector<MeasuredOval>& lights, const Mo
   return std::clamp(chi_square / degrees_of_freedom, min_ratio, 1.0);
 }
 
-Motion estimate_camera_motion(const std::vector<MeasuredOval>& lights) {
+Motion estimate_motion(const std::vector<MeasuredOval>& lights) {
   // Prior of the rotation: a camera that observes lamps rotates by less than a radian or two in
   // 10,000 scanlines.
   constexpr double max_turn = 1e-4;
@@ -84,7 +84,7 @@ std::optional<OutlineEquations::Estimate> OutlineEquations::solve_with_oval_prio
   return Estimate{solver.solve(right), solver.solve(Matrix5::Identity())};
 }
 
-std::optional<Shear> Shear::estimate_shear_from_outlines(std::span<const OutlineEquations> lights) {
+std::optional<Shear> Shear::estimate_shear(std::span<const OutlineEquations> lights) {
   constexpr double max_sd = 0.01;      // of the radius; of lights that are used
   constexpr double beyond_doubt = 30;  // a chi-square of 2
   constexpr double contradicts = 14;   // a chi-square of 2
@@ -100,7 +100,7 @@ std::optional<Shear> Shear::estimate_shear_from_outlines(std::span<const Outline
   }
   const std::size_t all = ovals.size();
   while (!ovals.empty() && 2 * ovals.size() >= all) {
-    const Motion motion = estimate_camera_motion(ovals);
+    const Motion motion = estimate_motion(ovals);
     const auto worst = std::max_element(
         ovals.begin(), ovals.end(), [&](const MeasuredOval& a, const MeasuredOval& b) {
           return a.compute_chi_square(motion.value) < b.compute_chi_square(motion.value);
@@ -118,14 +118,14 @@ std::optional<Shear> Shear::estimate_shear_from_outlines(std::span<const Outline
   return std::nullopt;
 }
 
-Oval Shear::predict_oval_from_motion(const OutlineEquations& light) const {
+Oval Shear::predict_oval(const OutlineEquations& light) const {
   const auto from_motion = compute_d_oval_d_motion(light);
   const Eigen::Vector2d oval = from_motion * motion_;
   return {oval,
           from_motion * covariance_ * from_motion.transpose() + compute_model_covariance(oval)};
 }
 
-Eigen::Vector2d Shear::motion_per_scanline(const OutlineEquations& light) const {
+Eigen::Vector2d Shear::motion_per_line(const OutlineEquations& light) const {
   const Eigen::Vector2d& at = light.circle.center;
   return 2 * (motion_.head<2>() + motion_[2] * Eigen::Vector2d(-at.y(), at.x()));
 }

@@ -61,13 +61,12 @@ class Shear {
   /// contradict the majority. Returns std::nullopt if less than half of the lights agree, or if the
   /// motion is not significant. Ovals that agree better than their variances state are up to twice
   /// as significant.
-  static std::optional<Shear> estimate_shear_from_outlines(
-      std::span<const OutlineEquations> lights);
+  static std::optional<Shear> estimate_shear(std::span<const OutlineEquations> lights);
 
   /// Returns the oval of a light's outline that the motion causes, with its covariance.
-  Oval predict_oval_from_motion(const OutlineEquations& light) const;
+  Oval predict_oval(const OutlineEquations& light) const;
   /// Returns the motion of a light in the level plane per scanline.
-  Eigen::Vector2d motion_per_scanline(const OutlineEquations& light) const;
+  Eigen::Vector2d motion_per_line(const OutlineEquations& light) const;
 
  private:
   Shear(const Eigen::Vector3d& motion, const Eigen::Matrix3d& covariance)

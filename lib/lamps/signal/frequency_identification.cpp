@@ -15,20 +15,20 @@ struct Candidate {
   double off, duty_off;
 };
 
-bool is_closer_in_frequency(const Candidate& a, const Candidate& b) {
+bool is_closer(const Candidate& a, const Candidate& b) {
   return b.off >= std::max(2 * a.off, a.off + kLampDrift);
 }
 
 bool is_better_match(const Candidate& a, const Candidate& b) {
-  if (is_closer_in_frequency(a, b)) return true;
-  if (is_closer_in_frequency(b, a)) return false;
+  if (is_closer(a, b)) return true;
+  if (is_closer(b, a)) return false;
   return a.lamp->duty && b.lamp->duty && b.duty_off >= a.duty_off + kDutyMargin;
 }
 
 }  // namespace
 
-std::optional<int> identify_lamp_by_frequency(const LampMap& lamps, double row_time_s,
-                                              const Stripes& stripes) {
+std::optional<int> identify_by_frequency(const LampMap& lamps, double row_time_s,
+                                         const Stripes& stripes) {
   // Lamps keep their frequency to a few per cent. Few or unclear stripes, for example of partly
   // hidden lamps, require a smaller deviation.
   const double max_off = are_stripes_reliable(stripes) ? 0.06 : kMaxUnclearDrift;

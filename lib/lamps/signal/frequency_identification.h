@@ -26,7 +26,7 @@ inline constexpr double kDutyMargin = 0.15;
 /// row_time) scanlines. The deviation of every other lamp's frequency has to be larger by
 /// kLampDrift and twice as large. Lamps with nearly the same frequency are separated by the duties
 /// of the map. Returns std::nullopt if the stripes agree with no lamp or with several lamps.
-std::optional<int> identify_lamp_by_frequency(const LampMap& lamps, double row_time_s,
-                                              const Stripes& stripes);
+std::optional<int> identify_by_frequency(const LampMap& lamps, double row_time_s,
+                                         const Stripes& stripes);
 
 }  // namespace vlp

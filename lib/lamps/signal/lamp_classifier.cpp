@@ -34,11 +34,9 @@ void standardize_classes(std::span<const LabeledLight> lights, LampClassifier& c
   classifier.mean.setZero();
   classifier.scale.setZero();
   const auto n = static_cast<double>(lights.size());
-  for (const LabeledLight& light : lights)
-    classifier.mean += compute_stripe_features_for_classifier(light.stripes) / n;
+  for (const LabeledLight& light : lights) classifier.mean += make_lamp_features(light.stripes) / n;
   for (const LabeledLight& light : lights) {
-    classifier.scale +=
-        (compute_stripe_features_for_classifier(light.stripes) - classifier.mean).cwiseAbs2() / n;
+    classifier.scale += (make_lamp_features(light.stripes) - classifier.mean).cwiseAbs2() / n;
   }
   constexpr double minimum = 1e-6;  // for a constant feature
   classifier.scale = classifier.scale.cwiseSqrt().cwiseMax(minimum);
@@ -53,8 +51,7 @@ void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
     auto& lamp = lamps.try_emplace(lights[i].lamp, none).first->second;
     if (!used[i]) continue;
     ++lamp.examples;
-    lamp.center +=
-        standardize_features(classifier, compute_stripe_features_for_classifier(lights[i].stripes));
+    lamp.center += standardize_features(classifier, make_lamp_features(lights[i].stripes));
   }
   for (auto& [id, lamp] : lamps) lamp.center /= std::max(1, lamp.examples);
   classifier.covariance.setZero();
@@ -62,8 +59,7 @@ void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
   for (std::size_t i = 0; i < lights.size(); ++i) {
     if (!used[i]) continue;
     const LampFeatures off =
-        standardize_features(classifier,
-                             compute_stripe_features_for_classifier(lights[i].stripes)) -
+        standardize_features(classifier, make_lamp_features(lights[i].stripes)) -
         lamps.at(lights[i].lamp).center;
     classifier.covariance += off * off.transpose();
     ++count;
@@ -81,12 +77,12 @@ void fit(std::span<const LabeledLight> lights, const std::vector<bool>& used,
 
 }  // namespace
 
-LampFeatures compute_stripe_features_for_classifier(const Stripes& stripes) {
+LampFeatures make_lamp_features(const Stripes& stripes) {
   assert(stripes.period_lines > 0);
   return {std::log(stripes.period_lines), stripes.duty, stripes.count_per_line, stripes.lit_area};
 }
 
-LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights) {
+LampClassifier fit_classifier(std::span<const LabeledLight> lights) {
   LampClassifier classifier;
   standardize_classes(lights, classifier);
   std::vector<bool> used(lights.size(), true);
@@ -97,8 +93,7 @@ LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights) {
     for (const auto& lamp : classifier.lamps) centers[lamp.lamp] = lamp.center;
     for (std::size_t i = 0; i < lights.size(); ++i) {
       const LampFeatures off =
-          standardize_features(classifier,
-                               compute_stripe_features_for_classifier(lights[i].stripes)) -
+          standardize_features(classifier, make_lamp_features(lights[i].stripes)) -
           centers.at(lights[i].lamp);
       constexpr double trimmed = 9;  // stricter than in use: outliers widen the covariance
       used[i] = compute_distance_squared(classifier.covariance, off) < trimmed;
@@ -107,11 +102,10 @@ LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights) {
   return classifier;
 }
 
-std::optional<int> identify_lamp_by_classifier(const LampClassifier& classifier,
-                                               const Stripes& stripes) {
+std::optional<int> identify_by_classifier(const LampClassifier& classifier,
+                                          const Stripes& stripes) {
   constexpr double min_probability = 0.99, farthest = 6, farthest_unclear = 3;
-  const LampFeatures z =
-      standardize_features(classifier, compute_stripe_features_for_classifier(stripes));
+  const LampFeatures z = standardize_features(classifier, make_lamp_features(stripes));
   const Eigen::LLT<Eigen::Matrix4d> factor(classifier.covariance);
   if (!are_stripes_readable(stripes)) return std::nullopt;
   double nearest = std::pow(are_stripes_reliable(stripes) ? farthest : farthest_unclear, 2);
@@ -130,7 +124,7 @@ std::optional<int> identify_lamp_by_classifier(const LampClassifier& classifier,
   return lamp->lamp;
 }
 
-std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifier) {
+std::vector<LampDistance> list_inseparable(const LampClassifier& classifier) {
   constexpr double minimum = 6;
   std::vector<LampDistance> pairs;
   for (std::size_t i = 0; i < classifier.lamps.size(); ++i) {
@@ -144,8 +138,7 @@ std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifie
   return pairs;
 }
 
-ConfusionMatrix cross_validate_lamp_classifier(std::span<const LabeledLight> lights,
-                                               const TrainClassifier& train) {
+ConfusionMatrix cross_validate(std::span<const LabeledLight> lights, const TrainClassifier& train) {
   std::set<int> lamps;
   for (const LabeledLight& light : lights) lamps.insert(light.lamp);
   const auto unknown = static_cast<Eigen::Index>(lamps.size());
@@ -162,7 +155,7 @@ ConfusionMatrix cross_validate_lamp_classifier(std::span<const LabeledLight> lig
     }
     const LampClassifier classifier = train(others);
     for (const LabeledLight& light : held_out) {
-      const auto answer = identify_lamp_by_classifier(classifier, light.stripes);
+      const auto answer = identify_by_classifier(classifier, light.stripes);
       ++confusion.counts(index_of(light.lamp), answer ? index_of(*answer) : unknown);
     }
   }
@@ -182,7 +175,7 @@ static void read_value(const YamlValue& value, Eigen::Matrix4d& covariance) {
     throw value.make_error("should be four rows of four numbers");
   for (Eigen::Index row = 0; row < 4; ++row)
     covariance.row(row) = rows[static_cast<std::size_t>(row)].transpose();
-  if (covariance != covariance.transpose() || !invert_positive_definite_matrix(covariance))
+  if (covariance != covariance.transpose() || !invert_positive_definite(covariance))
     throw value.make_error("is not a covariance: it should be symmetric and positive");
 }
 
@@ -227,8 +220,8 @@ LampClassifier read_lamp_classifier(const std::filesystem::path& file) {
   return read_yaml_document<LampClassifier>(file, kFormat);
 }
 
-void write_lamp_classifier(const std::filesystem::path& file, const LampClassifier& classifier) {
-  write_file(file, format_yaml_document(kFormat, classifier));
+void write_classifier(const std::filesystem::path& file, const LampClassifier& classifier) {
+  write_file(file, format_document(kFormat, classifier));
 }
 
 }  // namespace vlp

@@ -32,7 +32,7 @@ inline constexpr std::array<std::string_view, 4> kLampFeatures{"log_period_lines
                                                                "count_per_line", "lit_area"};
 
 /// Returns the features of a light's stripes. @pre The stripes have a period.
-LampFeatures compute_stripe_features_for_classifier(const Stripes& stripes);
+LampFeatures make_lamp_features(const Stripes& stripes);
 
 /// Training example: stripes of a light and the id of its lamp.
 struct LabeledLight {
@@ -76,7 +76,7 @@ inline constexpr int kMinExamples = 6;
 /// Excludes lights that are far from the others of their lamp, such as partly hidden ones. Shrinks
 /// C towards its diagonal with the weight of ten lights, and allows for a drift of the lamps by
 /// kLampDrift.
-LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights);
+LampClassifier fit_classifier(std::span<const LabeledLight> lights);
 
 /// Returns the id of the lamp with these stripes. @pre The stripes have a period.
 ///
@@ -85,8 +85,7 @@ LampClassifier fit_lamp_classifier(std::span<const LabeledLight> lights);
 /// - (z - c_k)^T C^-1 (z - c_k) exceeds 36 (3e-7 of normal lights), or 9 if the stripes are not
 ///   are_stripes_reliable().
 /// - The stripes are not are_stripes_readable().
-std::optional<int> identify_lamp_by_classifier(const LampClassifier& classifier,
-                                               const Stripes& stripes);
+std::optional<int> identify_by_classifier(const LampClassifier& classifier, const Stripes& stripes);
 
 /// Two lamps and their Mahalanobis distance, the square root of (c_j - c_k)^T C^-1 (c_j - c_k).
 struct LampDistance {
@@ -94,9 +93,9 @@ struct LampDistance {
   double distance;
 };
 
-/// Returns the pairs of lamps that identify_lamp_by_classifier() cannot separate, with a distance
+/// Returns the pairs of lamps that identify_by_classifier() cannot separate, with a distance
 /// below 6. At distance 6 one light in forty is unknown.
-std::vector<LampDistance> find_inseparable_lamps(const LampClassifier& classifier);
+std::vector<LampDistance> list_inseparable(const LampClassifier& classifier);
 
 /// Confusion matrix of a classifier for lights of known lamps.
 struct ConfusionMatrix {
@@ -105,12 +104,10 @@ struct ConfusionMatrix {
   /// Number of lights by lamp (row) and by result (column); the last column is "unknown".
   Eigen::MatrixXi counts;
 
-  int count_correctly_identified_lights() const { return counts.diagonal().sum(); }
+  int count_correct() const { return counts.diagonal().sum(); }
   /// Returns the number of lights that are identified as another lamp.
-  int count_wrongly_identified_lights() const {
-    return counts.sum() - count_correctly_identified_lights() - count_unidentified_lights();
-  }
-  int count_unidentified_lights() const { return counts.rightCols<1>().sum(); }
+  int count_wrong() const { return counts.sum() - count_correct() - count_unidentified(); }
+  int count_unidentified() const { return counts.rightCols<1>().sum(); }
 };
 
 /// Number of folds of the cross-validation.
@@ -120,9 +117,8 @@ using TrainClassifier = std::function<LampClassifier(std::span<const LabeledLigh
 
 /// Computes the confusion matrix by cross-validation. `train` makes a classifier of all images but
 /// every fifth one; this classifier is applied to the lights of the held-out images. The folds are
-/// deterministic. `lights` as for fit_lamp_classifier().
-ConfusionMatrix cross_validate_lamp_classifier(std::span<const LabeledLight> lights,
-                                               const TrainClassifier& train);
+/// deterministic. `lights` as for fit_classifier().
+ConfusionMatrix cross_validate(std::span<const LabeledLight> lights, const TrainClassifier& train);
 
 /// Reads a file of format `vlp-classifier/1`. Its keys are the names of the fields above, and
 /// `features`, which has to be kLampFeatures.
@@ -133,6 +129,6 @@ LampClassifier read_lamp_classifier(const std::filesystem::path& file);
 
 /// Writes a file for read_lamp_classifier() atomically. @throws InputError if the file cannot be
 /// written
-void write_lamp_classifier(const std::filesystem::path& file, const LampClassifier& classifier);
+void write_classifier(const std::filesystem::path& file, const LampClassifier& classifier);
 
 }  // namespace vlp

@@ -20,11 +20,11 @@ double compute_exposure_lines(const StripeConditions& conditions) {
 
 /// Returns the relative standard deviation of a lamp's period; 0 if the size of the lamp is
 /// unknown.
-double predict_lamp_period_sd(const Lamp& lamp, const StripeConditions& conditions) {
-  const auto lines = count_scanlines_on_lamp(lamp, conditions);
+double predict_lamp_sd(const Lamp& lamp, const StripeConditions& conditions) {
+  const auto lines = count_scanlines(lamp, conditions);
   if (!lines) return 0;
   const double period = 1 / (*lamp.frequency_hz * conditions.row_time_s);
-  return predict_relative_period_sd(period, *lines, compute_exposure_lines(conditions));
+  return predict_period_sd(period, *lines, compute_exposure_lines(conditions));
 }
 
 bool have_similar_duties(const Lamp& a, const Lamp& b) {
@@ -49,18 +49,18 @@ std::string list_rooms(const std::vector<std::string>& rooms) {
 
 }  // namespace
 
-bool are_lamps_indistinguishable(const Lamp& a, const Lamp& b) {
+bool are_indistinguishable(const Lamp& a, const Lamp& b) {
   return a.frequency_hz && b.frequency_hz &&
          std::abs(std::log(*a.frequency_hz / *b.frequency_hz)) < kLampDrift &&
          have_similar_duties(a, b);
 }
 
-std::string explain_why_room_must_be_chosen(const LampMapFile& lamps, const std::string& argument) {
+std::string explain_room_choice(const LampMapFile& lamps, const std::string& argument) {
   const auto& [file, map, rooms] = lamps;
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     for (std::size_t j = i + 1; j < map.lamps.size(); ++j) {
       if (rooms[i].empty() || rooms[j].empty() || rooms[i] == rooms[j]) continue;
-      if (!are_lamps_indistinguishable(map.lamps[i], map.lamps[j])) continue;
+      if (!are_indistinguishable(map.lamps[i], map.lamps[j])) continue;
       // [LAMP-10] `share a frequency` | map of several rooms | [rooms](vlp-train.md#rooms)
       return "lamps " + std::to_string(map.lamps[i].id) + " and " +
              std::to_string(map.lamps[j].id) +
@@ -71,15 +71,14 @@ std::string explain_why_room_must_be_chosen(const LampMapFile& lamps, const std:
   return "";
 }
 
-std::optional<double> count_scanlines_on_lamp(const Lamp& lamp,
-                                              const StripeConditions& conditions) {
+std::optional<double> count_scanlines(const Lamp& lamp, const StripeConditions& conditions) {
   const double above_m = lamp.position_m.z() - conditions.camera_height_m;
   const auto& size_m = lamp.shape.size_m;
   if (!size_m || !conditions.focal_px || !(above_m > 0)) return std::nullopt;
   return size_m->minCoeff() * *conditions.focal_px / above_m;
 }
 
-double predict_relative_period_sd(double period_lines, double lines, double exposure_lines) {
+double predict_period_sd(double period_lines, double lines, double exposure_lines) {
   const double periods = kUsedHeight * lines / period_lines;
   if (periods < kMinPeriods) return std::numeric_limits<double>::infinity();
   constexpr double noise = 0.02, blunt_lines = 1.2;
@@ -88,7 +87,7 @@ double predict_relative_period_sd(double period_lines, double lines, double expo
   return edge / period_lines * std::sqrt(6 / (periods * (periods * periods - 1)));
 }
 
-std::vector<AmbiguousLamps> find_ambiguous_lamps(const LampMap& lamps,
+std::vector<AmbiguousLamps> list_ambiguous_lamps(const LampMap& lamps,
                                                  const StripeConditions& conditions) {
   std::vector<AmbiguousLamps> pairs;
   for (std::size_t i = 0; i < lamps.lamps.size(); ++i) {
@@ -97,10 +96,9 @@ std::vector<AmbiguousLamps> find_ambiguous_lamps(const LampMap& lamps,
       if (!a.frequency_hz || !b.frequency_hz) continue;
       if (!have_similar_duties(a, b)) continue;
       const double gap = std::abs(std::log(*a.frequency_hz / *b.frequency_hz));
-      const double sd =
-          std::max(predict_lamp_period_sd(a, conditions), predict_lamp_period_sd(b, conditions));
+      const double sd = std::max(predict_lamp_sd(a, conditions), predict_lamp_sd(b, conditions));
       const double needed = kLampDrift + 4 * sd;
-      // find_lamps_with_unreadable_period() reports lamps without a measurable period.
+      // list_unreadable_lamps() reports lamps without a measurable period.
       if (gap >= needed || !std::isfinite(needed)) continue;
       pairs.push_back({a.id, b.id, std::expm1(gap), std::expm1(needed)});
     }
@@ -108,14 +106,14 @@ std::vector<AmbiguousLamps> find_ambiguous_lamps(const LampMap& lamps,
   return pairs;
 }
 
-std::vector<UnreadableLamp> find_lamps_with_unreadable_period(const LampMap& lamps,
-                                                              const StripeConditions& conditions) {
+std::vector<UnreadableLamp> list_unreadable_lamps(const LampMap& lamps,
+                                                  const StripeConditions& conditions) {
   std::vector<UnreadableLamp> unreadable;
   for (const Lamp& lamp : lamps.lamps) {
     if (!lamp.frequency_hz) continue;
     const double phase = std::numbers::pi * *lamp.frequency_hz * conditions.exposure_s.value_or(0);
     const double contrast = phase > 0 ? std::abs(std::sin(phase) / phase) : 1;
-    const auto lines = count_scanlines_on_lamp(lamp, conditions);
+    const auto lines = count_scanlines(lamp, conditions);
     const double periods = lines ? kUsedHeight * *lines * *lamp.frequency_hz * conditions.row_time_s
                                  : std::numeric_limits<double>::infinity();
     const double period_lines = 1 / (*lamp.frequency_hz * conditions.row_time_s);

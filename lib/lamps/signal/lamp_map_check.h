@@ -27,7 +27,7 @@ struct StripeConditions {
 /// size is the shorter axis of the lamp, which is across the scanlines in the worst case. Only the
 /// fraction kUsedHeight of the scanlines is used. Returns std::nullopt without a size or a focal
 /// length, or if the lamp is not above the camera.
-std::optional<double> count_scanlines_on_lamp(const Lamp& lamp, const StripeConditions& conditions);
+std::optional<double> count_scanlines(const Lamp& lamp, const StripeConditions& conditions);
 
 /// Predicts the relative standard deviation of the period that measure_stripes() measures on
 /// `lines` scanlines. A period is the slope of least-squares lines through the numbered begins and
@@ -43,18 +43,18 @@ std::optional<double> count_scanlines_on_lamp(const Lamp& lamp, const StripeCond
 ///
 /// This is an upper bound of the error measured on square waves; periods of an integer number of
 /// scanlines have smaller errors. Returns infinity below kMinPeriods.
-double predict_relative_period_sd(double period_lines, double lines, double exposure_lines);
+double predict_period_sd(double period_lines, double lines, double exposure_lines);
 
 /// Returns whether two lamps cannot be distinguished: their frequencies differ by less than
 /// kLampDrift, and their duties are unknown or differ by less than twice kDutyMargin. Returns false
 /// if a lamp has no frequency.
-bool are_lamps_indistinguishable(const Lamp& a, const Lamp& b);
+bool are_indistinguishable(const Lamp& a, const Lamp& b);
 
 /// Explains that a room has to be chosen, because two rooms have lamps with one frequency.
 ///
 /// @param argument  where the room is chosen, such as "the argument room of vlp_open_room()"
 /// @return          the message with the names of the rooms; empty if no room is needed
-std::string explain_why_room_must_be_chosen(const LampMapFile& lamps, const std::string& argument);
+std::string explain_room_choice(const LampMapFile& lamps, const std::string& argument);
 
 /// Two lamps that cannot be distinguished reliably.
 struct AmbiguousLamps {
@@ -63,12 +63,12 @@ struct AmbiguousLamps {
   double frequency_gap, required_gap;
 };
 
-/// Returns the pairs of lamps that identify_lamp_by_frequency() may fail to identify. Their
+/// Returns the pairs of lamps that identify_by_frequency() may fail to identify. Their
 /// frequencies differ by less than kLampDrift plus four standard deviations of a period, at which
 /// 95 % of the lights are identified. Their duties are unknown or differ by less than twice
 /// kDutyMargin. Lamps without a frequency are skipped; for lamps without a size only the drift
 /// counts.
-std::vector<AmbiguousLamps> find_ambiguous_lamps(const LampMap& lamps,
+std::vector<AmbiguousLamps> list_ambiguous_lamps(const LampMap& lamps,
                                                  const StripeConditions& conditions);
 
 /// Lamp that cannot be identified under the given conditions: it shows too few stripes, an exposure
@@ -85,7 +85,7 @@ struct UnreadableLamp {
 
 /// Returns the lamps with a period below kMinPeriod_lines, less than kMinPeriods periods, or a
 /// contrast below kMinContrast.
-std::vector<UnreadableLamp> find_lamps_with_unreadable_period(const LampMap& lamps,
-                                                              const StripeConditions& conditions);
+std::vector<UnreadableLamp> list_unreadable_lamps(const LampMap& lamps,
+                                                  const StripeConditions& conditions);
 
 }  // namespace vlp

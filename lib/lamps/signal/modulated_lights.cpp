@@ -68,8 +68,7 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
   for (const auto& [step, begin, end] : region.spans) {
     for (int x = begin; x < end; x += kCellWidth_px) {
       const int cell = (x - cells.box.x) / kCellWidth_px;
-      weights[std::size_t(cell - first_cell)] +=
-          map.amplitude[map.modulation_cell_index(step, cell)];
+      weights[std::size_t(cell - first_cell)] += map.amplitude[map.cell_index(step, cell)];
     }
   }
   const auto bin_at = [&](double line) {
@@ -81,7 +80,7 @@ LineProfile compute_profile(const CellLevels& cells, const ModulationMap& map,
   LineProfile profile{
       cells.box.y + (begin + 0.5) * cells.lines_per_bin - 0.5, cells.lines_per_bin, {}};
   for (int bin = begin; bin < end; ++bin) {
-    const float* row = cells.cell_levels_in_scanline_band(bin) + first_cell;
+    const float* row = cells.levels_of_bin(bin) + first_cell;
     double sum = 0;
     for (std::size_t c = 0; c < weights.size(); ++c) sum += double(weights[c]) * double(row[c]);
     profile.levels.push_back(std::max(0.0, sum));
@@ -100,7 +99,7 @@ std::vector<PeriodFit> fit_lamp_periods(const LineProfile& profile,
   return fits;
 }
 
-std::size_t find_best_matching_lamp(const std::vector<PeriodFit>& lamp_fits) {
+std::size_t select_best_lamp(const std::vector<PeriodFit>& lamp_fits) {
   const auto best = std::ranges::min_element(lamp_fits, {}, &PeriodFit::unexplained_fraction);
   return std::size_t(best - lamp_fits.begin());
 }
@@ -109,7 +108,7 @@ std::size_t find_best_matching_lamp(const std::vector<PeriodFit>& lamp_fits) {
 template <typename IsCompeting>
 std::optional<std::size_t> choose_lamp(const std::vector<PeriodFit>& lamp_fits,
                                        const IsCompeting& is_competing) {
-  const std::size_t best = find_best_matching_lamp(lamp_fits);
+  const std::size_t best = select_best_lamp(lamp_fits);
   if (lamp_fits[best].unexplained_fraction > kMaxUnexplained) return std::nullopt;
   for (std::size_t i = 0; i < lamp_fits.size(); ++i) {
     if (i != best && compute_log_ratio(lamp_fits[best], lamp_fits[i]) <= kMinLogRatio &&
@@ -160,8 +159,7 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
   std::complex<double> sum;
   double amplitudes = 0;
   for (const auto& [step, begin, end] : region.spans) {
-    const double middle =
-        (map.middle_scanline_of_step(step) + 0.5 - cells.box.y) / cells.lines_per_bin;
+    const double middle = (map.middle_of_step(step) + 0.5 - cells.box.y) / cells.lines_per_bin;
     const int first = std::max(0, static_cast<int>(std::ceil(middle - period)));
     const int last = std::min(cells.bins, static_cast<int>(std::floor(middle + period)));
     for (int x = begin; x < end; x += kCellWidth_px) {
@@ -169,8 +167,7 @@ double compute_phase_coherence(const CellLevels& cells, const ModulationMap& map
       std::complex<double> z;
       for (int bin = first; bin < last; ++bin) {
         const double weight = std::max(0.0, period - std::abs(bin + 0.5 - middle));
-        z += weight * double(cells.cell_levels_in_scanline_band(bin)[cell]) *
-             carrier[std::size_t(bin)];
+        z += weight * double(cells.levels_of_bin(bin)[cell]) * carrier[std::size_t(bin)];
       }
       sum += z;
       amplitudes += std::abs(z);
@@ -193,10 +190,10 @@ RegionCandidate examine_region(const CellLevels& cells, const ModulationMap& map
   for (const double period : lamp_periods_lines) margin = std::max(margin, period);
   candidate.profile = compute_profile(cells, map, candidate.region, margin);
   const LineProfile& profile = candidate.profile;
-  candidate.fit = find_best_fitting_period(profile, min_period_lines);
+  candidate.fit = fit_best_period(profile, min_period_lines);
   candidate.lamp_fits = fit_lamp_periods(profile, lamp_periods_lines);
   if (!lamp_periods_lines.empty()) {
-    const PeriodFit& lamp = candidate.lamp_fits[find_best_matching_lamp(candidate.lamp_fits)];
+    const PeriodFit& lamp = candidate.lamp_fits[select_best_lamp(candidate.lamp_fits)];
     candidate.is_other_period = compute_log_ratio(candidate.fit, lamp) > kMinLogRatio;
     if (!candidate.is_other_period) candidate.fit = lamp;
   }
@@ -213,7 +210,7 @@ RegionCandidate examine_region(const CellLevels& cells, const ModulationMap& map
 }
 
 /// Returns true if two candidates are parts of one light.
-bool are_parts_of_one_light(const RegionCandidate& a, const RegionCandidate& b) {
+bool are_one_light(const RegionCandidate& a, const RegionCandidate& b) {
   if (a.lamp != b.lamp) return false;
   const double ratio = a.fit.period_lines / b.fit.period_lines;
   if (!a.lamp && std::abs(ratio - 1) > 2 * kLampDrift) return false;
@@ -237,10 +234,9 @@ template <std::size_t n>
 void add_region_area(const ModulationMap& map, const ModulatedRegion& region, double peak,
                      const std::array<double, n>& fractions, std::array<LitArea, n>& areas) {
   for (const auto& [step, begin, end] : region.spans) {
-    const double line = map.middle_scanline_of_step(step);
+    const double line = map.middle_of_step(step);
     for (int x = begin; x < end; x += kCellWidth_px) {
-      const double amplitude =
-          map.amplitude[map.modulation_cell_index(step, (x - map.box.x) / kCellWidth_px)];
+      const double amplitude = map.amplitude[map.cell_index(step, (x - map.box.x) / kCellWidth_px)];
       for (std::size_t i = 0; i < n; ++i) {
         if (amplitude < fractions[i] * peak) continue;
         areas[i].sum += Eigen::Vector2d(x + (kCellWidth_px - 1) / 2.0, line);
@@ -251,7 +247,7 @@ void add_region_area(const ModulationMap& map, const ModulatedRegion& region, do
   }
 }
 
-Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
+Stripes measure_candidate(const RegionCandidate& candidate) {
   Stripes stripes = measure_stripes_of_period(candidate.profile, candidate.fit.period_lines);
   stripes.periods = count_periods(candidate);
   stripes.coherence = candidate.phase_coherence;
@@ -259,11 +255,11 @@ Stripes measure_candidate_stripes(const RegionCandidate& candidate) {
 }
 
 /// Returns the largest mean level in the columns of a span, at a step.
-float find_largest_mean(const ModulationMap& map, const ModulatedRegion::Span& span, int step) {
+float get_largest_mean(const ModulationMap& map, const ModulatedRegion::Span& span, int step) {
   float largest = 0;
   for (int x = span.begin; x < span.end; x += kCellWidth_px) {
     const int cell = (x - map.box.x) / kCellWidth_px;
-    largest = std::max(largest, map.mean[map.modulation_cell_index(step, cell)]);
+    largest = std::max(largest, map.mean[map.cell_index(step, cell)]);
   }
   return largest;
 }
@@ -272,17 +268,16 @@ float find_largest_mean(const ModulationMap& map, const ModulatedRegion::Span& s
 /// region continues there. A region may end within a period of them, because the half of the
 /// filter's window that is outside counts as dark. The other half contains a quarter of the mean
 /// level if a dark stripe is at the border.
-PixelBox extend_box_to_lit_border(const ModulationMap& map, const ModulatedRegion& region,
-                                  double period_lines) {
+PixelBox extend_box(const ModulationMap& map, const ModulatedRegion& region, double period_lines) {
   PixelBox box = region.box;
   float peak = 0;
   for (const auto& span : region.spans) {
-    peak = std::max(peak, find_largest_mean(map, span, span.step));
+    peak = std::max(peak, get_largest_mean(map, span, span.step));
   }
   for (const auto& span : region.spans) {
     for (const int border : {0, map.steps - 1}) {
       const bool is_near = std::abs(span.step - border) * map.lines_per_step < period_lines;
-      if (!is_near || 4 * find_largest_mean(map, span, border) < kBorderFraction * peak) continue;
+      if (!is_near || 4 * get_largest_mean(map, span, border) < kBorderFraction * peak) continue;
       box = enclosing_box(box, {span.begin, map.box.y + border * map.lines_per_step,
                                 span.end - span.begin, map.lines_per_step});
     }
@@ -303,7 +298,7 @@ ModulatedLight make_light(const ModulationMap& map,
                        0,
                        brightest.fit,
                        brightest.lamp,
-                       measure_candidate_stripes(brightest),
+                       measure_candidate(brightest),
                        0,
                        0,
                        brightest.is_split_off};
@@ -316,8 +311,7 @@ ModulatedLight make_light(const ModulationMap& map,
     // Darker parts are light that the lamp casts on its surroundings.
     if (part->region.peak_amplitude < double(kBorderFraction) * brightest.region.peak_amplitude)
       continue;
-    light.box = enclosing_box(
-        light.box, extend_box_to_lit_border(map, part->region, brightest.fit.period_lines));
+    light.box = enclosing_box(light.box, extend_box(map, part->region, brightest.fit.period_lines));
     add_region_area(map, part->region, brightest.region.peak_amplitude, fractions, areas);
   }
   light.energy = areas[0].energy;
@@ -345,7 +339,7 @@ std::vector<ModulatedLight> join_candidates(const ModulationMap& map,
     used[i] = true;
     for (std::size_t k = 0; k < parts.size(); ++k) {
       for (std::size_t j = i + 1; j < candidates.size(); ++j) {
-        if (used[j] || !are_parts_of_one_light(*parts[k], candidates[j])) continue;
+        if (used[j] || !are_one_light(*parts[k], candidates[j])) continue;
         used[j] = true;
         parts.push_back(&candidates[j]);
       }
@@ -385,25 +379,25 @@ struct BoxSearch {
   std::vector<RegionCandidate> candidates;
 };
 
-std::optional<BoxSearch> search_box_for_stripes(const ImageView& lines, const PixelBox& box,
-                                                const Background& background,
-                                                std::span<const double> lamp_periods_lines) {
+std::optional<BoxSearch> search_box(const ImageView& lines, const PixelBox& box,
+                                    const Background& background,
+                                    std::span<const double> lamp_periods_lines) {
   // Noise of at least one gray level is assumed.
   constexpr double min_noise = 1;
   const auto periods = choose_search_periods(lamp_periods_lines, box.height);
   if (periods.empty()) return std::nullopt;
   const double shortest = *std::min_element(periods.begin(), periods.end());
   const int lines_per_bin = std::max(1, static_cast<int>(shortest / kBinsPerPeriod));
-  const CellLevels cells = average_pixels_over_cells(lines, box, background.level, lines_per_bin);
+  const CellLevels cells = average_over_cells(lines, box, background.level, lines_per_bin);
   const bool splits_by_phase = !lamp_periods_lines.empty();
-  BoxSearch result{compute_modulation_map(cells, periods, splits_by_phase), {}};
+  BoxSearch result{make_modulation_map(cells, periods, splits_by_phase), {}};
   const double noise = std::max(min_noise, background.noise);
-  const double min_amplitude = compute_min_significant_amplitude(noise, shortest);
+  const double min_amplitude = compute_min_amplitude(noise, shortest);
   const auto examine = [&](ModulatedRegion region) {
     return examine_region(cells, result.map, std::move(region), lamp_periods_lines,
                           std::max(kMinPeriod_lines, shortest / 2));
   };
-  for (ModulatedRegion& region : find_modulated_regions(result.map, min_amplitude)) {
+  for (ModulatedRegion& region : list_modulated_regions(result.map, min_amplitude)) {
     if (region.cells >= kMinCells) result.candidates.push_back(examine(std::move(region)));
   }
   const auto contains = [](const RegionCandidate& candidate, const PixelBox& box) {
@@ -414,7 +408,7 @@ std::optional<BoxSearch> search_box_for_stripes(const ImageView& lines, const Pi
   };
   if (!splits_by_phase || std::ranges::none_of(result.candidates, is_out_of_phase)) return result;
   std::vector<RegionCandidate> parts;
-  for (ModulatedRegion& region : find_modulated_regions(result.map, min_amplitude, true)) {
+  for (ModulatedRegion& region : list_modulated_regions(result.map, min_amplitude, true)) {
     if (region.cells < kMinCells ||
         std::ranges::none_of(result.candidates, [&](const RegionCandidate& candidate) {
           return is_out_of_phase(candidate) && contains(candidate, region.box);
@@ -429,13 +423,13 @@ std::optional<BoxSearch> search_box_for_stripes(const ImageView& lines, const Pi
 
 }  // namespace
 
-std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
-                                                  std::span<const PixelBox> boxes,
-                                                  const Background& background,
-                                                  std::span<const double> lamp_periods_lines) {
+std::vector<ModulatedLight> detect_modulated_lights(const ImageView& lines,
+                                                    std::span<const PixelBox> boxes,
+                                                    const Background& background,
+                                                    std::span<const double> lamp_periods_lines) {
   std::vector<BoxSearch> searches;
   for (const PixelBox& box : boxes) {
-    if (auto found = search_box_for_stripes(lines, box, background, lamp_periods_lines)) {
+    if (auto found = search_box(lines, box, background, lamp_periods_lines)) {
       searches.push_back(std::move(*found));
     }
   }
@@ -474,13 +468,13 @@ std::optional<std::size_t> identify_lamp_period(const LineProfile& profile,
   if (!lamp || fits[*lamp].depth <= kMinLightDepth || fits[*lamp].periods < kMinPeriods)
     return std::nullopt;
   const double shortest = *std::ranges::min_element(lamp_periods_lines);
-  const PeriodFit any = find_best_fitting_period(profile, std::max(kMinPeriod_lines, shortest / 2));
+  const PeriodFit any = fit_best_period(profile, std::max(kMinPeriod_lines, shortest / 2));
   return compute_log_ratio(any, fits[*lamp]) > kMinLogRatio ? std::nullopt : lamp;
 }
 
 Stripes measure_stripes_of_period(const LineProfile& profile, double period_lines) {
   const PeriodFit fit = fit_period_near(profile, period_lines, 2 * kLampDrift);
-  Stripes stripes = measure_stripes(divide_profile_by_envelope(profile, fit.period_lines));
+  Stripes stripes = measure_stripes(divide_by_envelope(profile, fit.period_lines));
   stripes.period_lines = fit.period_lines;
   stripes.periods = fit.periods;
   stripes.periodicity_r2 = 1 - fit.unexplained_fraction;

@@ -34,7 +34,7 @@ struct ModulatedLight {
   /// possible.
   std::optional<std::size_t> lamp;
   /// Stripes of its brightest part, divided by the envelope. Their coherence is the phase coherence
-  /// |sum z| / sum |z| over the cells of this part, see find_modulated_lights().
+  /// |sum z| / sum |z| over the cells of this part, see detect_modulated_lights().
   Stripes stripes;
   /// Level of its brightest scanlines above the dark level, in gray levels. The fundamental of a
   /// square wave between 0 and this level has the amplitude (2 / pi) sin(pi duty) times the level.
@@ -55,7 +55,7 @@ struct ModulatedLight {
 /// @param lamp_periods_lines  periods of the lamps of the map; empty if the row time is unknown:
 ///        the lights then have the period that fits best
 ///
-/// Each region of the modulation map (see find_modulated_regions()) has a line profile, in which a
+/// Each region of the modulation map (see list_modulated_regions()) has a line profile, in which a
 /// column is weighted by its amplitude. The profile is fitted with each lamp's period within its
 /// drift, and with any other period. With the fractions u of the variance that the fits do not
 /// explain, the log-likelihood ratio of two periods is
@@ -74,10 +74,10 @@ struct ModulatedLight {
 /// modulated in phase, whatever its shape; the parts of letters and patterns are not. With the
 /// complex amplitude z of each cell at the period, the phase coherence |sum z| / sum |z| of a light
 /// exceeds 0.9. A phase change of a quarter of a period across the light reduces it to 0.9.
-std::vector<ModulatedLight> find_modulated_lights(const ImageView& lines,
-                                                  std::span<const PixelBox> boxes,
-                                                  const Background& background,
-                                                  std::span<const double> lamp_periods_lines);
+std::vector<ModulatedLight> detect_modulated_lights(const ImageView& lines,
+                                                    std::span<const PixelBox> boxes,
+                                                    const Background& background,
+                                                    std::span<const double> lamp_periods_lines);
 
 /// Returns the index of the lamp period that a profile has. Returns std::nullopt if no period
 /// explains 55 % of the variance of the profile with a modulation depth of 0.3, if there are less

@@ -71,7 +71,7 @@ CellArray compute_moving_mean(const CellArray& values, double length, Eigen::Ind
   return means;
 }
 
-/// Watershed of find_modulated_regions().
+/// Watershed of list_modulated_regions().
 class Watershed {
  public:
   Watershed(const ModulationMap& map, bool splits_by_phase)
@@ -102,10 +102,10 @@ class Watershed {
   }
 
   /// Returns the basin of a cell; negative if it has none.
-  int find_basin_of_cell(std::size_t cell) {
-    return labels_[cell] < 0 ? labels_[cell] : find_root(labels_[cell]);
+  int get_basin(std::size_t cell) {
+    return labels_[cell] < 0 ? labels_[cell] : get_root(labels_[cell]);
   }
-  int find_peak_cell(int basin) const { return peaks_[std::size_t(basin)]; }
+  int get_peak_cell(int basin) const { return peaks_[std::size_t(basin)]; }
   std::size_t size() const { return parents_.size(); }
 
  private:
@@ -137,7 +137,7 @@ class Watershed {
     sums_[std::size_t(into)] += sums_[std::size_t(from)];
     magnitudes_[std::size_t(into)] += magnitudes_[std::size_t(from)];
   }
-  int find_root(int label) {
+  int get_root(int label) {
     while (parents_[std::size_t(label)] != label) label = parents_[std::size_t(label)];
     return label;
   }
@@ -150,10 +150,10 @@ class Watershed {
     bool beside_border = false;
     for (int v = std::max(0, y - 1); v <= std::min(map_.steps - 1, y + 1); ++v) {
       for (int u = std::max(0, x - 1); u <= std::min(map_.cells - 1, x + 1); ++u) {
-        const int label = labels_[map_.modulation_cell_index(v, u)];
+        const int label = labels_[map_.cell_index(v, u)];
         beside_border = beside_border || label == kBorder;
         if (label < 0) continue;
-        const int other = find_root(label);
+        const int other = get_root(label);
         if (!is_in_phase(cell, other)) continue;
         if (basin < 0 || other == basin) {
           basin = other;
@@ -192,8 +192,8 @@ void add_cell(const ModulationMap& map, int step, int cell, ModulatedRegion& reg
 
 }  // namespace
 
-CellLevels average_pixels_over_cells(const ImageView& lines, const PixelBox& box, double dark_level,
-                                     int lines_per_bin) {
+CellLevels average_over_cells(const ImageView& lines, const PixelBox& box, double dark_level,
+                              int lines_per_bin) {
   CellLevels result{box,
                     (box.width + kCellWidth_px - 1) / kCellWidth_px,
                     (box.height + lines_per_bin - 1) / lines_per_bin,
@@ -216,8 +216,8 @@ CellLevels average_pixels_over_cells(const ImageView& lines, const PixelBox& box
   return result;
 }
 
-ModulationMap compute_modulation_map(const CellLevels& cells, std::span<const double> periods_lines,
-                                     bool keeps_amplitudes) {
+ModulationMap make_modulation_map(const CellLevels& cells, std::span<const double> periods_lines,
+                                  bool keeps_amplitudes) {
   ModulationMap map{cells.box,
                     cells.cells,
                     (cells.bins + kBinsPerStep - 1) / kBinsPerStep,
@@ -225,7 +225,7 @@ ModulationMap compute_modulation_map(const CellLevels& cells, std::span<const do
                     {},
                     {},
                     {}};
-  map.amplitude.assign(map.modulation_cell_index(map.steps, 0), 0);
+  map.amplitude.assign(map.cell_index(map.steps, 0), 0);
   map.mean.assign(map.amplitude.size(), 0);
   if (keeps_amplitudes)
     map.amplitudes.resize(Eigen::Index(periods_lines.size()), Eigen::Index(map.amplitude.size()));
@@ -244,7 +244,7 @@ ModulationMap compute_modulation_map(const CellLevels& cells, std::span<const do
                             kBinsPerStep / 2, kBinsPerStep, map.steps);
     for (int step = 0; step < map.steps; ++step) {
       for (int cell = 0; cell < map.cells; ++cell) {
-        const std::size_t k = map.modulation_cell_index(step, cell);
+        const std::size_t k = map.cell_index(step, cell);
         const std::complex<float> z(2 * filtered(step, cell), 2 * filtered(step, count + cell));
         if (keeps_amplitudes) map.amplitudes(Eigen::Index(i), Eigen::Index(k)) = z;
         const float amplitude = std::sqrt(std::norm(z));
@@ -257,12 +257,12 @@ ModulationMap compute_modulation_map(const CellLevels& cells, std::span<const do
   return map;
 }
 
-double compute_min_significant_amplitude(double noise, double period_lines) {
+double compute_min_amplitude(double noise, double period_lines) {
   const double mean_square = 4 * noise * noise / kCellWidth_px * 2 / (3 * period_lines);
   return std::sqrt(-std::log(kFalseAlarmRate) * mean_square);
 }
 
-std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map, double min_amplitude,
+std::vector<ModulatedRegion> list_modulated_regions(const ModulationMap& map, double min_amplitude,
                                                     bool splits_by_phase) {
   std::vector<int> order;
   for (std::size_t i = 0; i < map.amplitude.size(); ++i) {
@@ -282,12 +282,12 @@ std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map, do
   std::vector<ModulatedRegion> regions;
   for (int step = 0; step < map.steps; ++step) {
     for (int cell = 0; cell < map.cells; ++cell) {
-      const int basin = watershed.find_basin_of_cell(map.modulation_cell_index(step, cell));
+      const int basin = watershed.get_basin(map.cell_index(step, cell));
       if (basin < 0) continue;
       int& region = region_indices[std::size_t(basin)];
       if (region < 0) {
         region = static_cast<int>(regions.size());
-        const auto peak = std::size_t(watershed.find_peak_cell(basin));
+        const auto peak = std::size_t(watershed.get_peak_cell(basin));
         regions.push_back({{}, map.amplitude[peak], {}, 0});
       }
       add_cell(map, step, cell, regions[std::size_t(region)]);

@@ -24,14 +24,12 @@ struct CellLevels {
   /// Mean level of each cell above the dark level, in gray levels, by bin and cell.
   std::vector<float> levels;
 
-  const float* cell_levels_in_scanline_band(int bin) const {
-    return levels.data() + std::ptrdiff_t(bin) * cells;
-  }
+  const float* levels_of_bin(int bin) const { return levels.data() + std::ptrdiff_t(bin) * cells; }
 };
 
 /// Averages the pixels of `box` over cells. Subtracts `dark_level`; darker cells are 0.
-CellLevels average_pixels_over_cells(const ImageView& lines, const PixelBox& box, double dark_level,
-                                     int lines_per_bin);
+CellLevels average_over_cells(const ImageView& lines, const PixelBox& box, double dark_level,
+                              int lines_per_bin);
 
 /// Amplitude of the modulation in a part of an image, for each cell and every second bin.
 struct ModulationMap {
@@ -45,10 +43,8 @@ struct ModulationMap {
   Eigen::ArrayXXcf amplitudes;
 
   /// Returns the middle of a step's bin, as a scanline of the image.
-  double middle_scanline_of_step(int step) const {
-    return box.y + (step + 0.75) * lines_per_step - 0.5;
-  }
-  std::size_t modulation_cell_index(int step, int cell) const {
+  double middle_of_step(int step) const { return box.y + (step + 0.75) * lines_per_step - 0.5; }
+  std::size_t cell_index(int step, int cell) const {
     return std::size_t(step) * std::size_t(cells) + std::size_t(cell);
   }
 };
@@ -63,14 +59,14 @@ struct ModulationMap {
 /// for a square wave of duty 0.5. Scanlines outside the box count as dark.
 ///
 /// @param keeps_amplitudes  true: sets ModulationMap::amplitudes
-ModulationMap compute_modulation_map(const CellLevels& cells, std::span<const double> periods_lines,
-                                     bool keeps_amplitudes);
+ModulationMap make_modulation_map(const CellLevels& cells, std::span<const double> periods_lines,
+                                  bool keeps_amplitudes);
 
 /// Returns the amplitude that noise of the dark level exceeds with the probability 1e-9 in one
 /// cell, at one period, in gray levels. The squared amplitude of white noise with the standard
 /// deviation `noise` per pixel is exponentially distributed. Its mean is 4 noise^2 sum w^2 /
 /// kCellWidth_px, with sum w^2 = 2 / (3 P).
-double compute_min_significant_amplitude(double noise, double period_lines);
+double compute_min_amplitude(double noise, double period_lines);
 
 /// Minimum amplitude of a cell of a region, as a fraction of the region's maximum.
 inline constexpr float kBorderFraction = 0.12F;
@@ -97,7 +93,7 @@ struct ModulatedRegion {
 /// phase with it, at the period
 ///        with the largest sum of its complex amplitudes. This separates lamps that touch, and cuts
 ///        patterns into pieces.
-std::vector<ModulatedRegion> find_modulated_regions(const ModulationMap& map, double min_amplitude,
+std::vector<ModulatedRegion> list_modulated_regions(const ModulationMap& map, double min_amplitude,
                                                     bool splits_by_phase = false);
 
 }  // namespace vlp

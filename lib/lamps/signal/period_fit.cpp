@@ -81,16 +81,15 @@ struct Envelope {
         largest(*std::max_element(levels.begin(), levels.end())) {}
 
   /// Returns the weight of a bin, up to 1; 0 if it has too little light.
-  double compute_envelope_weight(std::size_t bin) const {
+  double compute_weight(std::size_t bin) const {
     const double fraction = levels[bin] / largest;
     return fraction < kMinEnvelope ? 0 : fraction;
   }
 };
 
 /// Fits a periodic signal to a profile of which the integrals are given.
-PeriodFit fit_periodic_signal_to_profile(const LineProfile& profile,
-                                         const std::vector<double>& integrals,
-                                         double period_lines) {
+PeriodFit fit_to_profile(const LineProfile& profile, const std::vector<double>& integrals,
+                         double period_lines) {
   PeriodFit fit{period_lines};
   const double period = period_lines / profile.lines_per_bin;
   if (profile.levels.empty() || !(period > 1)) return fit;
@@ -112,7 +111,7 @@ PeriodFit fit_periodic_signal_to_profile(const LineProfile& profile,
   double c = std::cos(start), s = std::sin(start);
   const double c_step = std::cos(step), s_step = std::sin(step);
   for (std::size_t i = 0; i < profile.levels.size(); ++i) {
-    const double weight = envelope.compute_envelope_weight(i);
+    const double weight = envelope.compute_weight(i);
     if (weight > 0) {
       ++lit;
       const double value = profile.levels[i] / envelope.levels[i] - 1;
@@ -127,7 +126,7 @@ PeriodFit fit_periodic_signal_to_profile(const LineProfile& profile,
   if (!(squares > 0)) return fit;
   const Cholesky<2 * kHarmonics> factor(normal);
   if (!factor.has_full_rank(1e-9)) return fit;
-  const HarmonicCoefficients coefficients = factor.solve_normal_equations(normal.gradient);
+  const HarmonicCoefficients coefficients = factor.solve_system(normal.gradient);
   fit.unexplained_fraction =
       std::clamp(1 - multiply_harmonics(coefficients, normal.gradient) / squares, 0.0, 1.0);
   fit.depth = std::hypot(coefficients[0], coefficients[1]);
@@ -149,7 +148,7 @@ PeriodFit search_frequencies(const LineProfile& profile, double min_frequency,
   PeriodFit best{2 / (min_frequency + max_frequency)};
   const auto improve = [&](double frequency) {
     const double period_lines = 1 / std::clamp(frequency, min_frequency, max_frequency);
-    const PeriodFit fit = fit_periodic_signal_to_profile(profile, integrals, period_lines);
+    const PeriodFit fit = fit_to_profile(profile, integrals, period_lines);
     if (fit.unexplained_fraction < best.unexplained_fraction) best = fit;
     return fit.unexplained_fraction;
   };
@@ -171,16 +170,16 @@ PeriodFit search_frequencies(const LineProfile& profile, double min_frequency,
 }  // namespace
 
 PeriodFit fit_periodic_signal(const LineProfile& profile, double period_lines) {
-  return fit_periodic_signal_to_profile(profile, integrate(profile.levels), period_lines);
+  return fit_to_profile(profile, integrate(profile.levels), period_lines);
 }
 
-std::vector<double> divide_profile_by_envelope(const LineProfile& profile, double period_lines) {
+std::vector<double> divide_by_envelope(const LineProfile& profile, double period_lines) {
   std::vector<double> signal;
   if (profile.levels.empty()) return signal;
   const Envelope envelope(integrate(profile.levels), period_lines / profile.lines_per_bin);
   if (!(envelope.largest > 0)) return signal;
   for (std::size_t i = 0; i < profile.levels.size(); ++i) {
-    if (envelope.compute_envelope_weight(i) == 0) continue;
+    if (envelope.compute_weight(i) == 0) continue;
     const double value = profile.levels[i] / envelope.levels[i];
     signal.insert(signal.end(), std::size_t(profile.lines_per_bin), value);
   }
@@ -193,7 +192,7 @@ PeriodFit fit_period_near(const LineProfile& profile, double period_lines, doubl
                             1 / (period_lines * (1 - max_drift)));
 }
 
-PeriodFit find_best_fitting_period(const LineProfile& profile, double min_period_lines) {
+PeriodFit fit_best_period(const LineProfile& profile, double min_period_lines) {
   constexpr double min_periods = 1.3, max_periods = 100;
   const double lines = double(profile.levels.size()) * profile.lines_per_bin;
   const double shortest = std::max(min_period_lines, lines / max_periods),

@@ -43,7 +43,7 @@ PeriodFit fit_periodic_signal(const LineProfile& profile, double period_lines);
 
 /// Divides a profile by its envelope for this period, see fit_periodic_signal(). Returns one value
 /// for each scanline with sufficient light; the brightest are about 1 / duty.
-std::vector<double> divide_profile_by_envelope(const LineProfile& profile, double period_lines);
+std::vector<double> divide_by_envelope(const LineProfile& profile, double period_lines);
 
 /// Fits all periods that differ from `period_lines` by at most the fraction `max_drift`, and
 /// returns the best fit.
@@ -51,6 +51,6 @@ PeriodFit fit_period_near(const LineProfile& profile, double period_lines, doubl
 
 /// Fits all periods from `min_period_lines` up to that of which the profile shows 1.3 periods, and
 /// returns the best fit. Skips periods of less than a hundredth of the profile.
-PeriodFit find_best_fitting_period(const LineProfile& profile, double min_period_lines);
+PeriodFit fit_best_period(const LineProfile& profile, double min_period_lines);
 
 }  // namespace vlp

@@ -76,7 +76,7 @@ double compute_weight(const PeriodGroup& group, double residual) {
 /// Assignment of period groups to the lamps of a map under one row time.
 struct PeriodMatch {
   double log_row_time;
-  /// Cost of the assignment, see estimate_row_time_candidates().
+  /// Cost of the assignment, see list_row_time_candidates().
   double cost;
   /// Residual of each group in log period; std::nullopt if no lamp is assigned.
   std::vector<std::optional<double>> residuals;
@@ -101,7 +101,7 @@ class PeriodMatching {
 
   /// Returns a refined match for every row time that maps the frequency of a lamp to the period of
   /// a group.
-  std::vector<PeriodMatch> find_row_time_matches() const {
+  std::vector<PeriodMatch> list_row_time_matches() const {
     std::vector<PeriodMatch> all;
     for (const PeriodGroup& group : groups_) {
       for (const auto& [log_frequency, lamps] : lamps_) {
@@ -141,7 +141,7 @@ class PeriodMatching {
     std::map<double, std::size_t> taken;  // frequency -> group
     std::vector<LampsByLogFrequency::const_iterator> nearest(groups_.size(), lamps_.end());
     for (std::size_t i = 0; i < groups_.size(); ++i) {
-      nearest[i] = find_lamps_of_nearest_frequency(groups_[i], log_row_time);
+      nearest[i] = look_up_nearest_lamps(groups_[i], log_row_time);
       if (nearest[i] == lamps_.end()) continue;
       const double residual = -groups_[i].log_period - nearest[i]->first - log_row_time;
       if (std::abs(residual) > kFarthest) continue;
@@ -160,13 +160,13 @@ class PeriodMatching {
       match.cost += compute_cost(groups_[i], match.residuals[i].value_or(kFarthest));
       if (!match.residuals[i]) continue;
       match.lamps[i] = groups_[i].lamp ? std::vector{*groups_[i].lamp} : nearest[i]->second;
-      match.cost += compute_duty_cycle_cost(groups_[i], match.lamps[i]);
+      match.cost += compute_duty_cost(groups_[i], match.lamps[i]);
     }
     return match;
   }
 
-  LampsByLogFrequency::const_iterator find_lamps_of_nearest_frequency(const PeriodGroup& group,
-                                                                      double log_row_time) const {
+  LampsByLogFrequency::const_iterator look_up_nearest_lamps(const PeriodGroup& group,
+                                                            double log_row_time) const {
     if (group.lamp) {
       const auto known = log_frequency_.find(*group.lamp);
       return known == log_frequency_.end() ? lamps_.end() : lamps_.find(known->second);
@@ -181,7 +181,7 @@ class PeriodMatching {
   }
 
   /// Returns the cost of the group's duty if the group is one of these lamps.
-  double compute_duty_cycle_cost(const PeriodGroup& group, const std::vector<int>& lamps) const {
+  double compute_duty_cost(const PeriodGroup& group, const std::vector<int>& lamps) const {
     if (duty_.empty() || !group.duty) return 0;
     double min_difference = std::numeric_limits<double>::infinity();
     for (const int lamp : lamps)
@@ -226,7 +226,7 @@ std::string format_microseconds(double row_time_s) {
 
 }  // namespace
 
-std::vector<PeriodGroup> group_lights_by_lamp_or_period(std::span<const MeasuredPeriod> lights) {
+std::vector<PeriodGroup> group_lights(std::span<const MeasuredPeriod> lights) {
   std::map<int, std::vector<std::size_t>> labeled;
   std::vector<std::size_t> others;
   for (std::size_t i = 0; i < lights.size(); ++i) {
@@ -251,16 +251,16 @@ std::vector<PeriodGroup> group_lights_by_lamp_or_period(std::span<const Measured
   return groups;
 }
 
-RowTimeCandidates estimate_row_time_candidates(std::span<const MeasuredPeriod> lights,
-                                               const LampMap& lamps) {
-  RowTimeCandidates found{group_lights_by_lamp_or_period(lights), {}, {}};
+RowTimeCandidates list_row_time_candidates(std::span<const MeasuredPeriod> lights,
+                                           const LampMap& lamps) {
+  RowTimeCandidates found{group_lights(lights), {}, {}};
   if (found.groups.empty()) {
     found.problem =
         "no light has clear stripes: add captures with lamps nearer, larger or sharper, and with a "
         "short exposure";
     return found;
   }
-  std::vector<PeriodMatch> matches = PeriodMatching(found.groups, lamps).find_row_time_matches();
+  std::vector<PeriodMatch> matches = PeriodMatching(found.groups, lamps).list_row_time_matches();
   if (matches.empty()) {
     found.problem =
         "no lamp of the map has one of the measured periods: are its frequencies right?";
@@ -281,8 +281,8 @@ RowTimeCandidates estimate_row_time_candidates(std::span<const MeasuredPeriod> l
   return found;
 }
 
-RowTimeResult select_row_time_candidate(const RowTimeCandidates& found,
-                                        std::span<const double> position_costs) {
+RowTimeResult select_row_time(const RowTimeCandidates& found,
+                              std::span<const double> position_costs) {
   if (found.candidates.empty()) return {{}, found.problem};
   assert(position_costs.empty() || position_costs.size() == found.candidates.size());
   std::vector<std::pair<double, const RowTimeCandidate*>> ranked;

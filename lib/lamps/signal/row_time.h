@@ -28,7 +28,7 @@ struct PeriodGroup {
   /// the period).
   double log_period;
   double sd;
-  /// Indices of the lights of the group in the input of group_lights_by_lamp_or_period().
+  /// Indices of the lights of the group in the input of group_lights().
   std::vector<std::size_t> lights;
   std::optional<int> lamp;
   /// Median of the measured duties; std::nullopt if there is none.
@@ -38,7 +38,7 @@ struct PeriodGroup {
 /// Groups lights with a label by their lamp. Groups the others by density of their periods: within
 /// 1.5 % of the period with most neighbors. Discards groups with less than 10 % of the lights of
 /// the largest group, or with less than 2 % of these lights. These are partly hidden lights.
-std::vector<PeriodGroup> group_lights_by_lamp_or_period(std::span<const MeasuredPeriod> lights);
+std::vector<PeriodGroup> group_lights(std::span<const MeasuredPeriod> lights);
 
 struct RowTime {
   double row_time_s;
@@ -54,7 +54,7 @@ struct RowTime {
 /// Row time that explains the measured periods, with the assignment of groups to lamps.
 struct RowTimeCandidate {
   RowTime row_time;
-  /// Cost, see estimate_row_time_candidates().
+  /// Cost, see list_row_time_candidates().
   double cost;
   /// Possible lamps of each group, by the index of the group: those with the resulting frequency;
   /// empty if no lamp has it.
@@ -104,8 +104,8 @@ inline constexpr double kMaxResidualSds = 20;
 ///
 /// @return  the row times that differ by 2 % or more and cost less than the best one plus
 ///        kClearCost; a problem if there is none
-RowTimeCandidates estimate_row_time_candidates(std::span<const MeasuredPeriod> lights,
-                                               const LampMap& lamps);
+RowTimeCandidates list_row_time_candidates(std::span<const MeasuredPeriod> lights,
+                                           const LampMap& lamps);
 
 /// Selects the candidate with the smallest cost.
 ///
@@ -113,7 +113,7 @@ RowTimeCandidates estimate_row_time_candidates(std::span<const MeasuredPeriod> l
 ///        empty if unknown
 /// @return a problem if another candidate costs less than kClearCost more, as with equal ratios of
 ///     all frequencies; also if less than half of the groups have a lamp
-RowTimeResult select_row_time_candidate(const RowTimeCandidates& found,
-                                        std::span<const double> position_costs = {});
+RowTimeResult select_row_time(const RowTimeCandidates& found,
+                              std::span<const double> position_costs = {});
 
 }  // namespace vlp

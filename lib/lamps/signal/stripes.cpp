@@ -49,7 +49,7 @@ Lanes compute_explained_fraction(const std::vector<double>& signal, double mean,
 
 /// Returns the positions of the begins or ends of stripes, where the signal crosses the middle
 /// between dark and bright.
-std::vector<double> find_crossings(const std::vector<double>& signal, double middle, bool rising) {
+std::vector<double> list_crossings(const std::vector<double>& signal, double middle, bool rising) {
   std::vector<double> places;
   for (std::size_t i = 1; i < signal.size(); ++i) {
     const double before = signal[i - 1] - middle, after = signal[i] - middle;
@@ -63,12 +63,12 @@ std::vector<double> find_crossings(const std::vector<double>& signal, double mid
 /// Fits the period to the begins and ends of stripes by least squares: one offset for the begins,
 /// one for the ends. Exact for square waves, where few periods bias a sine fit. Returns
 /// std::nullopt if there are too few or if they do not agree with `guess`.
-std::optional<double> fit_period_to_crossings(const std::vector<double>& signal, double middle,
-                                              double guess) {
+std::optional<double> fit_to_crossings(const std::vector<double>& signal, double middle,
+                                       double guess) {
   // Number and position of each crossing, relative to their means over the begins or the ends.
   std::vector<Eigen::Vector2d> points;
   for (const bool rising : {true, false}) {
-    const std::vector<double> places = find_crossings(signal, middle, rising);
+    const std::vector<double> places = list_crossings(signal, middle, rising);
     if (places.size() < 2) continue;
     const std::size_t first = points.size();
     Eigen::Vector2d point(0, places[0]), mean = Eigen::Vector2d::Zero();
@@ -98,7 +98,7 @@ std::optional<double> fit_period_to_crossings(const std::vector<double>& signal,
 
 /// Returns the fraction of the disc's area on scanlines brighter than `middle`, for chords in the
 /// middle of the disc.
-double compute_lit_area_fraction(const std::vector<double>& signal, double middle) {
+double compute_lit_fraction(const std::vector<double>& signal, double middle) {
   const auto n = static_cast<double>(signal.size());
   double lit = 0, all = 0;
   for (std::size_t i = 0; i < signal.size(); ++i) {
@@ -153,7 +153,7 @@ Stripes measure_stripes(const std::vector<double>& signal) {
   const double curvature = before - 2 * stripes.periodicity_r2 + after;
   if (curvature < 0) best += std::clamp((before - after) / curvature / 2, -1.0, 1.0) * step;
   const double middle = (low + high) / 2;
-  const auto in_time = fit_period_to_crossings(signal, middle, 1 / best);
+  const auto in_time = fit_to_crossings(signal, middle, 1 / best);
   stripes.is_regular = in_time.has_value();
   stripes.period_lines = in_time.value_or(1 / best);
   stripes.periods = n / stripes.period_lines;
@@ -165,9 +165,9 @@ Stripes measure_stripes(const std::vector<double>& signal) {
   }
   stripes.duty = std::clamp((lit / std::min(used, n) - low) / (high - low), 0.0, 1.0);
   const std::size_t edges =
-      find_crossings(signal, middle, true).size() + find_crossings(signal, middle, false).size();
+      list_crossings(signal, middle, true).size() + list_crossings(signal, middle, false).size();
   stripes.count_per_line = static_cast<double>(edges) / (2 * n);
-  stripes.lit_area = compute_lit_area_fraction(signal, middle);
+  stripes.lit_area = compute_lit_fraction(signal, middle);
   return stripes;
 }
 
@@ -188,7 +188,7 @@ std::vector<PartLevels> measure_parts(const ImageView& image, const std::vector<
       const int from = chord.begin + chord.pixel_run_width_px() * part / parts;
       const int to =
           std::max(from + 1, chord.begin + chord.pixel_run_width_px() * (part + 1) / parts);
-      line[part] = mean_level_of_pixel_run(image, {chord.row, from, to}) - dark;
+      line[part] = mean_level(image, {chord.row, from, to}) - dark;
     }
   }
   return levels;
@@ -196,7 +196,7 @@ std::vector<PartLevels> measure_parts(const ImageView& image, const std::vector<
 
 }  // namespace
 
-std::vector<PixelRun> find_chords_in_ellipse(const Eigen::Vector2d& low,
+std::vector<PixelRun> list_chords_in_ellipse(const Eigen::Vector2d& low,
                                              const Eigen::Vector2d& high, const ImageSize& size) {
   constexpr double used_width = 0.8;
   const Eigen::Vector2d center = (low + high) / 2, half = (high - low) / 2;
@@ -226,9 +226,8 @@ std::vector<double> compute_scanline_signal(const ImageView& image,
   return signal;
 }
 
-double compute_stripe_coherence_between_parts(const ImageView& lines,
-                                              const std::vector<PixelRun>& chords,
-                                              const Background& background, double period_lines) {
+double measure_part_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
+                              const Background& background, double period_lines) {
   constexpr double fraction = 0.05;
   constexpr std::size_t min_values = 3;
   const std::vector<PartLevels> levels = measure_parts(lines, chords, background.level);

@@ -27,7 +27,7 @@ inline constexpr double kUsedHeight = 0.9;
 
 /// Returns the pixels of a light on each scanline, without those at its rim. The light is an
 /// ellipse in the box from `low` to `high` (column, row) of an image of `size`.
-std::vector<PixelRun> find_chords_in_ellipse(const Eigen::Vector2d& low,
+std::vector<PixelRun> list_chords_in_ellipse(const Eigen::Vector2d& low,
                                              const Eigen::Vector2d& high, const ImageSize& size);
 
 /// Computes the level of each chord of a light above `dark`. Suppresses partial occlusion and
@@ -50,7 +50,7 @@ struct Stripes {
   double periods;
   /// True if the begins and ends of all stripes agree with the period.
   bool is_regular;
-  /// Result of compute_stripe_coherence_between_parts(), or the phase coherence of a modulated
+  /// Result of measure_part_coherence(), or the phase coherence of a modulated
   /// light, the larger one if both are measured; 0 if none is.
   double coherence;
   /// Number of stripes per scanline: half of the number of begins and ends divided by the number of
@@ -84,8 +84,8 @@ inline constexpr double kMinCoherence = 0.85;
 /// a scanline at the same time. A lamp's stripes are therefore on the same scanlines in all its
 /// parts, whatever its shape. In letters and patterns the parts differ.
 ///
-/// @param lines       image whose rows are the scanlines, see make_scanline_image()
-/// @param chords      pixels of the light on each scanline, see find_chords_in_ellipse()
+/// @param lines       image whose rows are the scanlines, see make_scanlines()
+/// @param chords      pixels of the light on each scanline, see list_chords_in_ellipse()
 /// @param background  dark level and noise of the image
 /// @param period_lines  period of the stripes
 /// @return  coherence, at most 1; 0 if the light has too few scanlines
@@ -102,8 +102,7 @@ inline constexpr double kMinCoherence = 0.85;
 /// Consider independent parts with three independent scanlines, as in one and a half periods. Each
 /// reaches kMinCoherence with a probability of (1 - 0.85) / 2, four of five together with 1.5e-4.
 /// Tilted bars reach it within 7 degrees if a light shows two of them.
-double compute_stripe_coherence_between_parts(const ImageView& lines,
-                                              const std::vector<PixelRun>& chords,
-                                              const Background& background, double period_lines);
+double measure_part_coherence(const ImageView& lines, const std::vector<PixelRun>& chords,
+                              const Background& background, double period_lines);
 
 }  // namespace vlp

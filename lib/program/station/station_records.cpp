@@ -35,7 +35,7 @@ constexpr const char* kAny = "any";
 
 /// Prints a line to stdout. Escapes control characters, so that names in records can neither add a
 /// line nor control the terminal.
-void print_line(const std::string& text) { fmt::print("{}\n", escape_text_for_single_line(text)); }
+void print_line(const std::string& text) { fmt::print("{}\n", escape_for_line(text)); }
 
 /// Runs of a station, or of records alone.
 struct KnownRuns {
@@ -48,7 +48,7 @@ struct KnownRuns {
 
 /// Opens the runs of a station, of which it first delivers those that wait, or of records alone.
 /// Reports the state of the spool. If the records are unavailable, commands that continue with
-/// waiting runs report it (warn_if_unavailable()).
+/// waiting runs report it (warn_if_offline()).
 KnownRuns open_runs(const StationRecordsOptions& options) {
   if (options.station.empty() == options.records.empty()) {
     throw std::invalid_argument("the records are not specified; give --station or --records");
@@ -57,26 +57,26 @@ KnownRuns open_runs(const StationRecordsOptions& options) {
   if (!options.station.empty()) station = read_station_config(options.station);
   KnownRuns known{station,
                   station ? Spool(station->spool, station->records) : Spool({}, options.records)};
-  known.runs.deliver_waiting_runs();
+  known.runs.deliver_waiting();
   try {
     if (known.runs.list_waiting_runs().empty()) known.runs.records_or_throw();
   } catch (const RecordsUnavailable& error) {
-    if (error.details != error.what()) spdlog::debug("{}", escape_text_for_terminal(error.details));
+    if (error.details != error.what()) spdlog::debug("{}", escape_for_terminal(error.details));
     throw;
   }
-  const std::string state = known.runs.describe_spool_state();
+  const std::string state = known.runs.describe_state();
   if (!state.empty()) {
-    const bool is_online = known.runs.last_offline_reason().empty();
+    const bool is_online = known.runs.offline_reason().empty();
     spdlog::log(is_online ? spdlog::level::warn : spdlog::level::debug, "{}",
-                escape_text_for_terminal(state));
+                escape_for_terminal(state));
   }
   return known;
 }
 
 /// Reports that a command used the waiting runs because the records are unavailable.
-void warn_if_unavailable(KnownRuns& known) {
-  if (known.runs.last_offline_reason().empty()) return;
-  spdlog::warn("{}", escape_text_for_terminal(known.runs.make_spool_notice_for_operator()));
+void warn_if_offline(KnownRuns& known) {
+  if (known.runs.offline_reason().empty()) return;
+  spdlog::warn("{}", escape_for_terminal(known.runs.make_operator_notice()));
 }
 
 /// Returns the filter with "any" replaced by no condition.
@@ -88,7 +88,7 @@ RunFilter remove_conditions_any(RunFilter filter) {
 }
 
 /// Returns the filter of the options: runs of --station, unless --of-station is given.
-RunFilter make_filter_of_options(const StationRecordsOptions& options, const KnownRuns& known) {
+RunFilter filter_by_options(const StationRecordsOptions& options, const KnownRuns& known) {
   RunFilter filter = options.filter;
   if (filter.station.empty() && known.station_config() != nullptr) {
     filter.station = known.station_config()->station;
@@ -100,28 +100,26 @@ RunFilter make_filter_of_options(const StationRecordsOptions& options, const Kno
 RunRecord load_selected_run(KnownRuns& known, const StationRecordsOptions& options) {
   std::string name = options.run;
   if (name.empty()) {
-    const auto runs = known.runs.list_run_summaries(make_filter_of_options(options, known));
+    const auto runs = known.runs.list_run_summaries(filter_by_options(options, known));
     if (runs.empty()) throw std::invalid_argument("there is no such run");
     name = runs.back().run;
   }
   RunRecord run = known.runs.require_run(name);
-  warn_if_unavailable(known);
+  warn_if_offline(known);
   return run;
 }
 
-/// Returns make_filter_of_options() restricted to units, unless --kind is given.
-RunFilter make_filter_of_comparable_runs(const StationRecordsOptions& options,
-                                         const KnownRuns& known) {
-  RunFilter filter = make_filter_of_options(options, known);
+/// Returns filter_by_options() restricted to units, unless --kind is given.
+RunFilter filter_comparable(const StationRecordsOptions& options, const KnownRuns& known) {
+  RunFilter filter = filter_by_options(options, known);
   if (options.filter.kind.empty()) filter.kind = "unit";
   return filter;
 }
 
 /// Checks that all points are from one station, if neither options nor filter name a station.
-void check_values_are_of_one_station(const std::vector<TrendPoint>& points,
-                                     const StationRecordsOptions& options) {
-  if (options.station.empty() && options.filter.station.empty())
-    check_values_are_of_one_station(points);
+void check_one_station(const std::vector<TrendPoint>& points,
+                       const StationRecordsOptions& options) {
+  if (options.station.empty() && options.filter.station.empty()) check_one_station(points);
 }
 
 /// Checks that --output is not an input of the command: the records, station.yaml, or a file named
@@ -133,11 +131,11 @@ void check_output_option(const StationRecordsOptions& options, const KnownRuns& 
     inputs.push_back(station->records);
     for (const auto& file : station->inputs) inputs.push_back(file.string());
   }
-  check_output_is_not_input(options.output, inputs);
+  check_output_is_no_input(options.output, inputs);
 }
 
 /// Returns the folder for the files of a run.
-std::filesystem::path find_results_folder(const StationRecordsOptions& options) {
+std::filesystem::path require_results_folder(const StationRecordsOptions& options) {
   if (!options.output.empty()) return options.output;
   if (!options.station.empty()) return read_station_config(options.station).results;
   throw std::invalid_argument("the output folder is not specified; give --station or --output");
@@ -173,7 +171,7 @@ std::map<std::string, double> parse_references(const std::vector<std::string>& t
 std::string format_estimate_test(const EstimateTest& estimate) {
   return fmt::format("{:>12.4g}{:>12.3g}{:>9.2f}{:>9.4f}   {:.4g} to {:.4g}{}", estimate.value,
                      estimate.standard_error, estimate.t, estimate.p, estimate.low, estimate.high,
-                     estimate.differs_significantly_from_zero() ? "   shows" : "");
+                     estimate.is_significant() ? "   shows" : "");
 }
 
 /// Prints bias and linearity of a station against reference units.
@@ -182,16 +180,16 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
   KnownRuns known = open_runs(options);
   check_output_option(options, known);
   const auto points = load_metric_values(known.runs.records_or_throw(), options.metric,
-                                         make_filter_of_comparable_runs(options, known));
-  check_values_are_of_one_station(points, options);
-  const auto values = select_values_of_reference_units(points, references);
+                                         filter_comparable(options, known));
+  check_one_station(points, options);
+  const auto values = select_reference_values(points, references);
   std::vector<std::string> units;
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   const BiasStudy study = run_study([&] {
-    check_runs_share_no_images(known.runs.records_or_throw(), points,
-                               select_values_of_study_units(points, units));
-    return analyze_bias_and_linearity(values);
+    check_no_shared_images(known.runs.records_or_throw(), points,
+                           select_study_values(points, units));
+    return analyze_bias(values);
   });
   constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}";
   print_line(fmt::format("{}: bias against {} reference units, {}", options.metric,
@@ -217,7 +215,7 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
                linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
     for (const UnitBias& unit : study.units) {
       const double at = linearity.predict_bias_at(unit.reference),
-                   half = linearity.confidence_half_width_at(unit.reference);
+                   half = linearity.half_width_at(unit.reference);
       print_line(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}", unit.unit,
                              unit.reference, at, at - half, at + half,
                              std::abs(at) > half ? "   without 0" : ""));
@@ -227,16 +225,16 @@ void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
 }
 
 /// Returns true if the filter keeps all runs of a camera, so that its first one is known.
-bool includes_all_runs_of_camera(const RunFilter& filter) {
+bool includes_all_runs(const RunFilter& filter) {
   return filter.verdict.empty() && filter.operator_name.empty() && filter.shift.empty() &&
          filter.since.empty() && filter.until.empty() && filter.last == 0;
 }
 
 }  // namespace
 
-void print_station_run_list(const StationRecordsOptions& options) {
+void print_runs(const StationRecordsOptions& options) {
   KnownRuns known = open_runs(options);
-  RunFilter filter = make_filter_of_options(options, known);
+  RunFilter filter = filter_by_options(options, known);
   const auto runs = known.runs.list_run_summaries(filter);
   constexpr const char* line = "{:<34} {:<20} {:<8} {:<7} {:<12} {:<16} {}";
   print_line(
@@ -248,7 +246,7 @@ void print_station_run_list(const StationRecordsOptions& options) {
                            counts ? run.causes.substr(0, run.causes.find('\n'))
                                   : "was " + run.verdict + ": " + run.voided));
   }
-  const RunCounts counts = count_runs_by_verdict(runs);
+  const RunCounts counts = count_runs(runs);
   fmt::print("\n{} runs, {} passed, {} failed, {} invalid", runs.size(), counts.passed,
              counts.failed, counts.invalid);
   if (counts.voided > 0) fmt::print(", {} voided", counts.voided);
@@ -258,7 +256,7 @@ void print_station_run_list(const StationRecordsOptions& options) {
   }
   fmt::print("\n");
   if (const auto yield = counts.compute_first_pass_yield();
-      yield && includes_all_runs_of_camera(options.filter)) {
+      yield && includes_all_runs(options.filter)) {
     fmt::print("{} cameras, {} with more than one judged run: first-pass yield {:.1f} %\n",
                counts.cameras, counts.cameras_reworked, percent * *yield);
   }
@@ -275,7 +273,7 @@ void print_station_run_list(const StationRecordsOptions& options) {
   known.runs.records_or_throw();  // an incomplete list is an error
 }
 
-void print_station_run_details(const StationRecordsOptions& options) {
+void print_run(const StationRecordsOptions& options) {
   KnownRuns known = open_runs(options);
   const RunRecord record = load_selected_run(known, options);
   for (const ScreenLine& line : make_verdict_screen(record)) print_line(line.text);
@@ -285,7 +283,7 @@ void print_station_run_details(const StationRecordsOptions& options) {
     print_line(fmt::format("{:<28}{:>12.4g} {}", metric.name, *metric.value, metric.unit));
   }
   fmt::print("\n");
-  for (const RunField& field : list_run_text_fields()) {
+  for (const RunField& field : list_run_fields()) {
     if (field.label == nullptr || (record.*field.text).empty()) continue;
     print_line(fmt::format("{:<11}{}", field.label, record.*field.text));
   }
@@ -298,38 +296,38 @@ void print_station_run_details(const StationRecordsOptions& options) {
 }
 
 void restore_run_files(const StationRecordsOptions& options) {
-  const std::filesystem::path results = find_results_folder(options);
+  const std::filesystem::path results = require_results_folder(options);
   KnownRuns known = open_runs(options);
   const RunRecord record = load_selected_run(known, options);
-  const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
+  const std::string no_verdict = explain_void_verdict(record);
   if (!no_verdict.empty()) throw InputError(record.run, no_verdict);
   print_line(publish_run_files(record, {}, results, ExistingReport::replace).string());
 }
 
-void write_calibration_certificate(const StationRecordsOptions& options) {
-  const std::filesystem::path results = find_results_folder(options);
+void write_certificate(const StationRecordsOptions& options) {
+  const std::filesystem::path results = require_results_folder(options);
   KnownRuns known = open_runs(options);
   const RunRecord record = load_selected_run(known, options);
-  print_line(write_calibration_certificate(record, results).string());
+  print_line(write_certificate(record, results).string());
 }
 
-void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
+void list_or_delete_expired(const StationRecordsOptions& options) {
   KnownRuns known = open_runs(options);
   const StationConfig& config = *known.station;
   if (!config.retention.images_days && !config.retention.results_days) {
     throw InputError(options.station, "nothing expires; add the key 'retention'");
   }
-  check_clock_against_recorded_runs(config, known.runs.records_or_throw());
-  const RetentionResult found = find_expired_run_folders(config, known.runs.records_or_throw());
+  check_clock(config, known.runs.records_or_throw());
+  const RetentionResult found = list_expired_folders(config, known.runs.records_or_throw());
   constexpr double megabyte = 1e6;
   double all_mb = 0;
   std::size_t done = 0;
   for (const ExpiredFolder& expired : found.expired) {
     const double mb = double(expired.bytes) / megabyte;
     try {
-      if (options.remove) delete_expired_run_folder(expired, config, known.runs);
+      if (options.remove) delete_expired(expired, config, known.runs);
     } catch (const InputError& error) {
-      spdlog::warn("{}", escape_text_for_terminal(error.what()));
+      spdlog::warn("{}", escape_for_terminal(error.what()));
       continue;
     }
     ++done;
@@ -349,7 +347,7 @@ void list_or_delete_expired_run_folders(const StationRecordsOptions& options) {
   }
   fmt::print("{} folders, {:.1f} MB{}\n", done, all_mb,
              options.remove ? " deleted" : ": --delete deletes them");
-  known.runs.deliver_waiting_runs();
+  known.runs.deliver_waiting();
   if (done == found.expired.size()) return;
   // [FILE-1] `could not be deleted`
   throw std::runtime_error(fmt::format("{} of {} folders could not be deleted",
@@ -360,17 +358,16 @@ void void_recorded_run(const StationRecordsOptions& options) {
   KnownRuns known = open_runs(options);
   const auto [record, problem, files_problem] = void_recorded_run(
       known.runs, known.station_config(), options.run, options.operator_name, options.reason);
-  if (!problem.empty()) spdlog::error("{}", escape_text_for_terminal(problem));
-  if (!files_problem.empty()) spdlog::warn("{}", escape_text_for_terminal(files_problem));
-  warn_if_unavailable(known);
+  if (!problem.empty()) spdlog::error("{}", escape_for_terminal(problem));
+  if (!files_problem.empty()) spdlog::warn("{}", escape_for_terminal(files_problem));
+  warn_if_offline(known);
   print_line(fmt::format("{} {} {}: voided", record.run, record.camera, record.verdict));
-  for (const ScreenLine& line : make_pending_hook_lines(record)) print_line(line.text);
+  for (const ScreenLine& line : make_hook_lines(record)) print_line(line.text);
 }
 
-void verify_records_by_audit_trail(const StationRecordsOptions& options) {
+void verify_records(const StationRecordsOptions& options) {
   KnownRuns known = open_runs(options);
-  const TrailCheck found =
-      known.runs.records_or_throw().check_records_by_audit_trail(options.expected_digest);
+  const TrailCheck found = known.runs.records_or_throw().check_trail(options.expected_digest);
   for (const std::string& problem : found.problems) print_line(problem);
   fmt::print("{} runs, {} entries in the trail\n", found.runs, found.entries);
   if (!found.last_digest.empty()) fmt::print("last digest {}\n", found.last_digest);
@@ -382,20 +379,20 @@ void verify_records_by_audit_trail(const StationRecordsOptions& options) {
       found.problems.size() == 1 ? "" : fmt::format(", and {} more", found.problems.size() - 1)));
 }
 
-void export_selected_runs(const StationRecordsOptions& options) {
+void export_runs(const StationRecordsOptions& options) {
   KnownRuns known = open_runs(options);
   check_output_option(options, known);
   Records& records = known.runs.records_or_throw();
   std::vector<RunRecord> runs;
-  for (const RunSummary& run : records.list_run_summaries(make_filter_of_options(options, known))) {
+  for (const RunSummary& run : records.list_run_summaries(filter_by_options(options, known))) {
     if (auto record = records.find_run_by_id(run.run)) runs.push_back(std::move(*record));
   }
-  export_runs_to_file(options.output, runs);
+  write_runs(options.output, runs);
   fmt::print("{} runs\n", runs.size());
 }
 
-void import_archive_sessions_as_runs(const StationRecordsOptions& options) {
-  auto [sessions, undated, crashed, refused] = read_reprocessed_archive_sessions(options.archive);
+void import_archive(const StationRecordsOptions& options) {
+  auto [sessions, undated, crashed, refused] = read_reprocessed(options.archive);
   if (undated > 0) {
     // [STATION-14] `program crashed`, `neither archive.csv`, `session with a date`
     spdlog::warn("{} sessions are ignored: neither archive.csv nor their names have their date",
@@ -416,14 +413,14 @@ void import_archive_sessions_as_runs(const StationRecordsOptions& options) {
     } else {
       std::optional<RunRecord> read;
       try {
-        read = load_run_of_archive_session(sessions[i]);
+        read = load_archive_run(sessions[i]);
       } catch (const InputError& error) {
         refused.emplace_back(error.what());
       }
       if (read) records.store_run(*read);
       ++(read ? taken : unread);
     }
-    progress.update_progress_display(i + 1, sessions.size());
+    progress.update(i + 1, sessions.size());
   }
   if (!sessions.empty()) {
     print_line(fmt::format("station {}: {} runs added, {} existed", sessions.front().run.station,
@@ -443,22 +440,22 @@ void import_archive_sessions_as_runs(const StationRecordsOptions& options) {
 }
 
 void print_metric_trend(const StationRecordsOptions& options) {
-  const MetricKind kind = find_run_metric_kind(options.metric);
+  const MetricKind kind = require_run_metric_kind(options.metric);
   KnownRuns known = open_runs(options);
   check_output_option(options, known);
   Records& records = known.runs.records_or_throw();
-  RunFilter filter = make_filter_of_comparable_runs(options, known);
+  RunFilter filter = filter_comparable(options, known);
   if (options.filter.verdict.empty()) filter.verdict = verdict_name(Verdict::pass);
   const auto points = records.load_metric_trend(options.metric, filter);
-  check_values_are_of_one_station(points, options);
+  check_one_station(points, options);
   constexpr std::size_t min_points = 2;
   if (points.size() < min_points) {
     throw Undetermined(
         fmt::format("{} of the runs have {}: a trend needs two", points.size(), options.metric));
   }
   const std::vector<double> values = extract_trend_values(points);
-  const auto alarms = find_control_chart_alarms(values, options.rules);
-  const ControlChart chart = compute_control_chart(values);
+  const auto alarms = list_chart_alarms(values, options.rules);
+  const ControlChart chart = make_control_chart(values);
   const auto gate = find_gate_limit(options.metric, known.station_config(), records, points);
   if (!options.output.empty())
     write_trend_plot(options.output, options.metric, points, alarms, gate);
@@ -466,7 +463,7 @@ void print_metric_trend(const StationRecordsOptions& options) {
                          points.front().ended_utc, points.back().ended_utc));
   fmt::print("mean      {:.4g} {}\nlimits    {:.4g} to {:.4g}\n", chart.mean, kind.unit,
              chart.lower, chart.upper);
-  if (gate) fmt::print("gate      {} {:.4g}\n", describe_limit_direction(kind.direction), *gate);
+  if (gate) fmt::print("gate      {} {:.4g}\n", describe_direction(kind.direction), *gate);
   for (const ChartAlarm& alarm : alarms) {
     const TrendPoint& point = points[alarm.index];
     print_line(fmt::format("{} {} {} {:.4g}  {}: {}", point.ended_utc, point.run, point.camera,
@@ -477,21 +474,21 @@ void print_metric_trend(const StationRecordsOptions& options) {
                                alarms.back().rule, points[alarms.back().index].run));
 }
 
-void print_process_capability(const StationRecordsOptions& options) {
-  std::vector<MetricKind> kinds = list_run_metric_kinds();
-  if (!options.metric.empty()) kinds = {find_run_metric_kind(options.metric)};
+void print_capability(const StationRecordsOptions& options) {
+  std::vector<MetricKind> kinds = list_run_metrics();
+  if (!options.metric.empty()) kinds = {require_run_metric_kind(options.metric)};
   KnownRuns known = open_runs(options);
   Records& records = known.runs.records_or_throw();
-  const RunFilter filter = make_filter_of_comparable_runs(options, known);
+  const RunFilter filter = filter_comparable(options, known);
   constexpr const char* head = "{:<27}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
   std::vector<std::string> rows;
   rows.reserve(kinds.size());
   for (const MetricKind& kind : kinds) {
     const auto points = load_metric_values(records, kind.name, filter);
-    check_values_are_of_one_station(points, options);
+    check_one_station(points, options);
     const auto gate = find_gate_limit(kind.name, known.station_config(), records, points);
     const auto found =
-        compute_process_capability(extract_trend_values(points), make_tolerance_limits(kind, gate));
+        compute_capability(extract_trend_values(points), make_specification_limits(kind, gate));
     if (!found) continue;
     const auto index = [](const CapabilityIndex& of) {
       return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
@@ -512,17 +509,17 @@ void print_process_capability(const StationRecordsOptions& options) {
 }
 
 void print_gauge_study(const StationRecordsOptions& options) {
-  const MetricKind kind = find_run_metric_kind(options.metric);
+  const MetricKind kind = require_run_metric_kind(options.metric);
   if (!options.references.empty()) return print_bias(kind, options);
   KnownRuns known = open_runs(options);
   Records& records = known.runs.records_or_throw();
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
   const auto points = load_metric_values(records, options.metric, remove_conditions_any(filter));
-  const auto values = select_values_of_study_units(points, options.units);
+  const auto values = select_study_values(points, options.units);
   const MeasurementStudy study = run_study([&] {
-    check_runs_share_no_images(records, points, values);
-    return analyze_repeatability_and_reproducibility(values);
+    check_no_shared_images(records, points, values);
+    return analyze_study(values);
   });
   const auto gate = find_gate_limit(options.metric, known.station_config(), records, points);
   print_line(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}", options.metric,
@@ -553,15 +550,15 @@ void print_gauge_study(const StationRecordsOptions& options) {
   part("measurement, total (GRR)", study.grr);
   part("units (PV)", study.unit_sd);
   part("total (TV)", study.total);
-  if (const auto categories = study.compute_number_of_distinct_categories()) {
+  if (const auto categories = study.count_distinct_categories()) {
     fmt::print("distinct categories (ndc){:>21}\n", *categories);
   }
   if (const auto percent_of_tolerance =
-          study.compute_precision_to_tolerance_percent(make_tolerance_limits(kind, gate))) {
+          study.precision_to_tolerance_percent(make_specification_limits(kind, gate))) {
     fmt::print("measurement / tolerance (P/T){:>17.1f} %\n", *percent_of_tolerance);
   } else if (gate) {
     fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n",
-               describe_limit_direction(kind.direction), *gate);
+               describe_direction(kind.direction), *gate);
   }
   if (study.stations == 1) {
     fmt::print("\nOne station: differences between stations are unknown.\n");

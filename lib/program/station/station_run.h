@@ -27,7 +27,7 @@ struct StationRunOptions {
 
 /// Measures a unit up to its verdict (vlp-station run with a camera). Throws GateNotMet if the unit
 /// fails, Undetermined if the run is invalid.
-void measure_camera_unit(const StationRunOptions& options);
+void measure_unit(const StationRunOptions& options);
 
 /// Measures units whose ids are scanned or typed, a line each, until `q` or the end of the input
 /// (vlp-station run without a camera). The id of the golden unit verifies the station.
@@ -35,16 +35,16 @@ void measure_camera_unit(const StationRunOptions& options);
 /// Each unit runs in a separate process of this program on the same terminal. Memory that libraries
 /// leak per unit (mrcal 2.2: about 3 MB) is released with the process, and a crash does not end the
 /// shift.
-void measure_units_with_scanned_ids(StationRunOptions options);
+void measure_scanned_units(StationRunOptions options);
 
 /// Measures the golden unit, from the folder `batch` or the folder where its images arrive
 /// (vlp-station verify). Throws GateNotMet if the station has moved, Undetermined if the run is
 /// invalid.
-void verify_station_with_golden_unit(const StationRunOptions& options);
+void verify_with_golden(const StationRunOptions& options);
 
 /// Runs the hook again for the runs of the station whose hook failed or did not finish (vlp-station
 /// hook). Uses the records, if available, and the runs in the spool. Throws std::runtime_error if
 /// the hook fails again.
-void rerun_unfinished_hooks(const StationRunOptions& options);
+void rerun_hooks(const StationRunOptions& options);
 
 }  // namespace vlp

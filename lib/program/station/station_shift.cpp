@@ -33,7 +33,7 @@ constexpr const char* kQuit = "q";
 std::optional<std::string> read_word(const std::string& label, Terminal& terminal) {
   constexpr std::size_t longest = 64;
   const auto line = terminal.read_input_line({{label}});
-  return line ? std::optional(escape_text_for_terminal(truncate_utf8_text(*line, longest)))
+  return line ? std::optional(escape_for_terminal(truncate_utf8_text(*line, longest)))
               : std::nullopt;
 }
 
@@ -54,7 +54,7 @@ bool begin_work_shift(std::string& operator_name, std::string& shift, Terminal& 
 /// Reads the id of the next unit, or of the golden unit, until it is one that the station accepts.
 /// Returns std::nullopt for `q` and at the end of the input.
 std::optional<std::string> read_serial(const StationConfig& config, Terminal& terminal) {
-  const std::string golden = describe_golden_unit_problem(config);
+  const std::string golden = describe_golden_problem(config);
   std::string problem;
   for (;;) {
     std::vector<ScreenLine> prompt;
@@ -66,7 +66,7 @@ std::optional<std::string> read_serial(const StationConfig& config, Terminal& te
     if (!line || *line == kQuit) return std::nullopt;
     if (line->empty()) continue;
     const bool is_golden = config.golden_unit && *line == config.golden_unit->camera_id;
-    problem = is_golden ? "" : describe_serial_number_problem(config, *line);
+    problem = is_golden ? "" : describe_serial_problem(config, *line);
     if (problem.empty()) return line;
     // Without a screen, the prompt does not print the problem.
     if (!terminal.is_interactive()) spdlog::error("{}", problem);
@@ -115,8 +115,7 @@ int run_process(const std::vector<std::string>& command) {
       return kBadInput;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    if (was_interrupt_signal_received() && !is_signaled)
-      is_signaled = ::kill(process, SIGTERM) == 0;
+    if (was_interrupted() && !is_signaled) is_signaled = ::kill(process, SIGTERM) == 0;
   }
   if (WIFEXITED(status)) return WEXITSTATUS(status);
   // [STATION-10] `ended by signal`
@@ -126,7 +125,7 @@ int run_process(const std::vector<std::string>& command) {
 
 }  // namespace
 
-void measure_units_with_scanned_ids(StationRunOptions options) {
+void measure_scanned_units(StationRunOptions options) {
   StationConfig config = read_station_config(options.station);
   Terminal terminal;
   std::map<int, int> exit_counts;  // number of units by exit code
@@ -148,7 +147,7 @@ void measure_units_with_scanned_ids(StationRunOptions options) {
       ++exit_counts[code];
     }
     const bool judged = code == kDone || code == kGateNotMet || code == kUndetermined;
-    if (was_interrupt_signal_received() && !judged) {
+    if (was_interrupted() && !judged) {
       // [STATION-10] `left in the middle`
       throw std::runtime_error("the shift was left in the middle of a unit");
     }

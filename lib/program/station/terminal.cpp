@@ -88,7 +88,7 @@ Terminal::~Terminal() {
   for (const int signal : {SIGINT, SIGTERM, SIGQUIT, SIGTSTP}) std::signal(signal, SIG_DFL);
 }
 
-Terminal::Size Terminal::query_terminal_size() {
+Terminal::Size Terminal::query_size() {
   winsize known{};
   if (::ioctl(::fileno(stdout), TIOCGWINSZ, &known) != 0 || known.ws_col == 0 ||
       known.ws_row == 0) {
@@ -97,14 +97,14 @@ Terminal::Size Terminal::query_terminal_size() {
   return {known.ws_col, known.ws_row};
 }
 
-bool Terminal::was_terminal_resized() const {
-  return interactive_ && num_drawn_lines_ > 0 && (query_terminal_size() != size_ || resumed);
+bool Terminal::was_resized() const {
+  return interactive_ && num_drawn_lines_ > 0 && (query_size() != size_ || resumed);
 }
 
 /// Replaces the drawn text. Clears the screen after a change of size or a stop, because the
 /// position of the drawn text is unknown then.
-void Terminal::replace_drawn_terminal_text(const std::string& text, std::size_t lines) {
-  const Size current_size = query_terminal_size();
+void Terminal::replace_text(const std::string& text, std::size_t lines) {
+  const Size current_size = query_size();
   const bool moved = num_drawn_lines_ > 0 && (resumed.exchange(false) || current_size != size_);
   if (text == last_text_ && !moved) return;
   const std::string home = moved                  ? "\x1b[2J\x1b[H"
@@ -117,32 +117,30 @@ void Terminal::replace_drawn_terminal_text(const std::string& text, std::size_t 
   size_ = current_size;
 }
 
-void Terminal::redraw_terminal_screen(const std::vector<ScreenLine>& lines) {
+void Terminal::redraw(const std::vector<ScreenLine>& lines) {
   if (!interactive_) return;
-  const auto [columns, rows] = query_terminal_size();
+  const auto [columns, rows] = query_size();
   const std::size_t num_lines = std::min(lines.size(), rows - 1);
   std::string text;
   for (std::size_t i = 0; i < num_lines; ++i) {
     // The last line lists the keys and is always drawn.
     const auto& [line, style] = i + 1 == num_lines ? lines.back() : lines[i];
-    text += colorize_text(truncate_utf8_text(escape_text_for_single_line(line), columns), style) +
-            "\x1b[K\n";
+    text += colorize_text(truncate_utf8_text(escape_for_line(line), columns), style) + "\x1b[K\n";
   }
-  replace_drawn_terminal_text(text, num_lines);
+  replace_text(text, num_lines);
 }
 
 void Terminal::print_permanent_lines(const std::vector<ScreenLine>& lines) {
   std::string text;
   for (const auto& [line, style] : lines) {
-    text += colorize_text(escape_text_for_single_line(line), style) +
-            (interactive_ ? "\x1b[K\n" : "\n");
+    text += colorize_text(escape_for_line(line), style) + (interactive_ ? "\x1b[K\n" : "\n");
   }
   if (!interactive_) {
     fmt::print("{}", text);
     std::fflush(stdout);  // the next output may be delayed
     return;
   }
-  replace_drawn_terminal_text(text, lines.size());
+  replace_text(text, lines.size());
   num_drawn_lines_ = 0;
   last_text_.clear();
 }
@@ -159,15 +157,13 @@ std::optional<char> Terminal::wait_for_key(int wait_ms) const {
   char first = 0, key = 0;
   if (!read_key(first, wait_ms)) return std::nullopt;
   bool alone = true;
-  while (!was_interrupt_signal_received() && read_key(key, kMaxScannerPause_ms))
-    alone = alone && key == first;
+  while (!was_interrupted() && read_key(key, kMaxScannerPause_ms)) alone = alone && key == first;
   return alone ? std::optional(first) : std::nullopt;
 }
 
 void Terminal::discard_typed_keys() const {
   char key = 0;
-  while (reads_keys_ && !was_interrupt_signal_received() && read_key(key, kMaxScannerPause_ms))
-    continue;
+  while (reads_keys_ && !was_interrupted() && read_key(key, kMaxScannerPause_ms)) continue;
 }
 
 std::optional<std::string> Terminal::read_input_line(std::vector<ScreenLine> prompt) {
@@ -177,14 +173,14 @@ std::optional<std::string> Terminal::read_input_line(std::vector<ScreenLine> pro
   const std::string prompt_text = prompt.back().text;
   std::string typed;
   if (!interactive_ && ::isatty(STDIN_FILENO) == 1) {
-    fmt::print(stderr, "{}\n", escape_text_for_terminal(prompt_text));
+    fmt::print(stderr, "{}\n", escape_for_terminal(prompt_text));
   }
   for (;;) {
     prompt.back().text = prompt_text + typed;
-    redraw_terminal_screen(prompt);
+    redraw(prompt);
     pollfd input{STDIN_FILENO, POLLIN, 0};
     char key = 0;
-    if (was_interrupt_signal_received()) return std::nullopt;
+    if (was_interrupted()) return std::nullopt;
     if (::poll(&input, 1, poll_interval_ms) < 1) continue;
     const bool ended = ::read(STDIN_FILENO, &key, 1) != 1 || key == end;
     if (ended && typed.empty()) return std::nullopt;
@@ -205,6 +201,6 @@ std::optional<std::string> Terminal::read_input_line(std::vector<ScreenLine> pro
                                     : typed.substr(first, typed.find_last_not_of(' ') + 1 - first);
 }
 
-bool was_interrupt_signal_received() { return stop_requested; }
+bool was_interrupted() { return stop_requested; }
 
 }  // namespace vlp

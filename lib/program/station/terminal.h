@@ -16,7 +16,7 @@ namespace vlp {
 class Terminal {
  public:
   /// Switches stdin to single keys without echo if stdin and stdout are terminals. In any case,
-  /// SIGINT and SIGTERM do not end the process but are recorded (was_interrupt_signal_received()).
+  /// SIGINT and SIGTERM do not end the process but are recorded (was_interrupted()).
   /// Both until destruction.
   Terminal();
   ~Terminal();
@@ -26,12 +26,12 @@ class Terminal {
   bool is_interactive() const { return interactive_; }
   /// Redraws the screen in place if the lines have changed; only on a terminal. Crops lines to the
   /// size of the terminal, but keeps the last one.
-  void redraw_terminal_screen(const std::vector<ScreenLine>& lines);
+  void redraw(const std::vector<ScreenLine>& lines);
   /// Replaces the drawn screen by lines that stay.
   void print_permanent_lines(const std::vector<ScreenLine>& lines);
-  /// Returns true if the size of the terminal has changed since the last redraw_terminal_screen(),
+  /// Returns true if the size of the terminal has changed since the last redraw(),
   /// or if the process was stopped (Ctrl-Z) since then.
-  bool was_terminal_resized() const;
+  bool was_resized() const;
   /// Returns the key pressed within `wait_ms`; std::nullopt if there is none. Several different
   /// keys in quick succession come from a scanner and are ignored; repetitions of one key count as
   /// one.
@@ -51,8 +51,8 @@ class Terminal {
     std::size_t columns, rows;
     bool operator==(const Size&) const = default;
   };
-  static Size query_terminal_size();
-  void replace_drawn_terminal_text(const std::string& text, std::size_t lines);
+  static Size query_size();
+  void replace_text(const std::string& text, std::size_t lines);
   std::string colorize_text(const std::string& text, ScreenLineStyle style) const;
 
   bool interactive_, has_color_, reads_keys_ = false;
@@ -63,6 +63,6 @@ class Terminal {
 
 /// Returns true if SIGINT or SIGTERM arrived while a Terminal existed. The program should end; its
 /// work is on disk.
-bool was_interrupt_signal_received();
+bool was_interrupted();
 
 }  // namespace vlp

@@ -25,7 +25,7 @@
 
 namespace vlp {
 
-FrontendOptions make_default_image_intake_options() {
+FrontendOptions make_intake_options() {
   FrontendOptions options;
   options.threads = count_cpu_cores();
   return options;
@@ -36,10 +36,10 @@ void add_capture_options(CLI::App& app, CaptureOptions& options, const CaptureTe
   app.add_option("--lamps", options.lamps, "Lamp map, lamps.yaml")->required();
   app.add_option("--calibration", options.calibration, texts.calibration)->required();
   app.add_option("-o,--output", options.output, texts.output)->required();
-  add_lamp_detection_options(app, options);
+  add_lamp_options(app, options);
 }
 
-void add_lens_model_option(CLI::App& app, std::string& lens) {
+void add_lens_model(CLI::App& app, std::string& lens) {
   app.add_option("--lens", lens,
                  "Lens model (default: LENSMODEL_OPENCV8). auto: selected by cross-validation over "
                  "the views")
@@ -49,7 +49,7 @@ void add_lens_model_option(CLI::App& app, std::string& lens) {
       });
 }
 
-void add_readout_direction_option(CLI::App& app, std::optional<Readout>& readout) {
+void add_readout(CLI::App& app, std::optional<Readout>& readout) {
   static const std::map<std::string, Readout> names{{"rows", Readout::rows},
                                                     {"columns", Readout::columns}};
   app.add_option_function<std::string>(
@@ -60,13 +60,13 @@ void add_readout_direction_option(CLI::App& app, std::optional<Readout>& readout
       ->option_text("rows|columns");
 }
 
-void add_frame_step_option(CLI::App& app, int& every) {
+void add_frame_step(CLI::App& app, int& every) {
   app.add_option("--every", every, "Use every Nth frame of a video (default: 1)")
       ->check(CLI::Range(1, 1000000))
       ->option_text("N");
 }
 
-void reject_frame_step_without_video(int every, const std::vector<std::string>& files) {
+void check_frame_step(int every, const std::vector<std::string>& files) {
   if (every == 1 || std::any_of(files.begin(), files.end(), is_video_file_name)) return;
   throw std::invalid_argument("--every: there is no video; leave it out");
 }
@@ -76,23 +76,23 @@ void add_room_option(CLI::App& app, std::string& room) {
                  "Room whose lamps are used, by the key room in the lamp map (default: all lamps)");
 }
 
-void write_refined_lamp_map(const std::filesystem::path& file, const LampMap& map,
-                            const std::string& room) {
+void write_refined_map(const std::filesystem::path& file, const LampMap& map,
+                       const std::string& room) {
   write_lamp_map(file, map);
   if (room.empty()) return;
   fmt::print("{} contains the lamps of room {} only: use it without --room\n",
-             escape_text_for_terminal(file.string()), escape_text_for_terminal(room));
+             escape_for_terminal(file.string()), escape_for_terminal(room));
 }
 
 void add_max_mpx_option(CLI::App& app, double& max_mpx) {
   app.add_option(
          "--max-mpx", max_mpx,
          "Maximum size of an image, in megapixels; larger images are skipped unread (default: 200)")
-      ->check(make_finite_positive_validator())
+      ->check(make_positive_validator())
       ->check(CLI::Range(0.001, 1e6));
 }
 
-void add_board_image_quality_options(CLI::App& app, FrontendOptions& options) {
+void add_quality_options(CLI::App& app, FrontendOptions& options) {
   constexpr double min_limit = 1e-4, max_limit = 0.1;
   app.add_option("--max-blur-fraction", options.max_blur_fraction,
                  "Maximum blur of a board image: sigma of its sharpest edges, as a fraction of the "
@@ -104,17 +104,17 @@ void add_board_image_quality_options(CLI::App& app, FrontendOptions& options) {
       ->check(CLI::Range(0.0, 1.0));
 }
 
-void add_lamp_detection_options(CLI::App& app, CaptureOptions& options) {
+void add_lamp_options(CLI::App& app, CaptureOptions& options) {
   add_room_option(app, options.frontend.room);
   app.add_option("--classifier", options.frontend.classifier,
                  "Lamp classifier of vlp-train, used instead of the frequencies in the map");
   app.add_option("--annotate", options.frontend.annotate,
                  "Output folder of annotated images with outlines, centers and lamp ids");
-  add_readout_direction_option(app, options.frontend.readout);
+  add_readout(app, options.frontend.readout);
   app.add_option(
          "--exposure-s", options.frontend.exposure_s,
          "Exposure time of the images, in s, for the check of the lamp map (default: short)")
-      ->check(make_finite_positive_validator());
+      ->check(make_positive_validator());
   add_max_mpx_option(app, options.frontend.max_mpx);
   add_threads_option(app, options.frontend.threads);
 }
@@ -126,44 +126,44 @@ std::optional<KnownMotion> MotionOptions::make_motion_prior() const {
       *max_speed_m_per_s, rad_from_deg(max_yaw_rate_deg_per_s.value_or(fastest_deg_per_s)));
 }
 
-void add_motion_limit_options(CLI::App& app, MotionOptions& options, const char* help) {
+void add_motion_options(CLI::App& app, MotionOptions& options, const char* help) {
   app.add_option("--max-speed-m-per-s", options.max_speed_m_per_s, help)
-      ->check(make_finite_positive_validator());
+      ->check(make_positive_validator());
   app.add_option(
          "--max-yaw-rate-deg-per-s", options.max_yaw_rate_deg_per_s,
          "Maximum yaw rate with --max-speed-m-per-s, in degrees/s (default: 180); 0: no rotation")
-      ->check(make_finite_non_negative_validator())
+      ->check(make_non_negative_validator())
       ->needs("--max-speed-m-per-s");
 }
 
-void add_yaw_rate_sd_option(CLI::App& app, std::optional<double>& yaw_rate_sd_deg_per_s) {
+void add_yaw_rate_sd(CLI::App& app, std::optional<double>& yaw_rate_sd_deg_per_s) {
   app.add_option("--yaw-rate-sd-deg-per-s", yaw_rate_sd_deg_per_s,
                  "Standard deviation of yaw_rate_rad_per_s in captures.csv, in degrees/s (default: "
                  "0, exact)")
-      ->check(make_finite_non_negative_validator());
+      ->check(make_non_negative_validator());
 }
 
-std::vector<std::string> list_capture_input_files(const CaptureOptions& options) {
+std::vector<std::string> list_capture_files(const CaptureOptions& options) {
   return {options.images, options.lamps, options.calibration, options.frontend.classifier.string()};
 }
 
-LampImages make_lamp_detection_input(const CaptureOptions& options, const LampMap& lamps,
-                                     const std::optional<Calibration>& calibration) {
+LampImages make_lamp_images(const CaptureOptions& options, const LampMap& lamps,
+                            const std::optional<Calibration>& calibration) {
   return {options.images,          lamps,
           options.lamps,           calibration,
           options.calibration,     options.captures,
           options.yaw_in_robot_rad};
 }
 
-void check_outputs_are_not_images(const CaptureOptions& options) {
+void check_outputs(const CaptureOptions& options) {
   if (is_video_file_name(options.images)) return;
   for (const auto& image : list_images(options.images)) {
-    check_output_is_not_input(options.output, {image.string()});
-    if (!options.lights.empty()) check_output_is_not_input(options.lights, {image.string()});
+    check_output_is_no_input(options.output, {image.string()});
+    if (!options.lights.empty()) check_output_is_no_input(options.lights, {image.string()});
   }
 }
 
-void print_detected_lights(const Observations& seen) {
+void print_lights(const Observations& seen) {
   if (!spdlog::should_log(spdlog::level::debug)) return;
   for (const Observation& image : seen.images) {
     for (const Light& light : image.lights)
@@ -171,52 +171,50 @@ void print_detected_lights(const Observations& seen) {
   }
 }
 
-Observations detect_lamps_in_captures(const CaptureOptions& options, ImageUse use,
-                                      const LampMap& lamps,
-                                      const std::optional<Calibration>& calibration) {
-  check_outputs_are_not_images(options);
+Observations detect_captured_lamps(const CaptureOptions& options, ImageUse use,
+                                   const LampMap& lamps,
+                                   const std::optional<Calibration>& calibration) {
+  check_outputs(options);
   Observations seen;
   {
     Progress progress("images");
-    seen = detect_lamps_in_images(make_lamp_detection_input(options, lamps, calibration), use,
-                                  options.frontend, [&](std::size_t done, std::size_t total) {
-                                    progress.update_progress_display(done, total);
-                                  });
+    seen = detect_lamps(make_lamp_images(options, lamps, calibration), use, options.frontend,
+                        [&](std::size_t done, std::size_t total) { progress.update(done, total); });
   }
   StepResult remarks;
-  add_image_intake_remarks(seen, remarks);
+  add_intake_remarks(seen, remarks);
   // A classifier identifies lamps without the row time.
   if (options.frontend.classifier.empty() || remarks.has_succeeded()) {
     const auto camera = calibration
                             ? make_detector_camera(*calibration)
                             : DetectorCamera{Readout::rows, options.frontend.row_time_s, {}};
     const auto file = std::filesystem::path(options.calibration).filename();
-    add_row_time_contradiction_to_result(seen.images, lamps, camera,
-                                         calibration ? file.string() : "--row-time-s", remarks);
+    add_row_time_remark(seen.images, lamps, camera, calibration ? file.string() : "--row-time-s",
+                        remarks);
   }
   print_step_remarks(remarks);
-  print_detected_lights(seen);
+  print_lights(seen);
   if (!options.lights.empty()) write_lights_table(options.lights, seen.images);
-  throw_if_step_failed(remarks);
+  require_success(remarks);
   return seen;
 }
 
 LampCaptures read_lamp_captures(const CaptureOptions& options, ImageUse use) {
   LampCaptures captures{{},
-                        read_overhead_lamps_of_room(options.lamps, options.frontend.room),
+                        read_overhead_lamps(options.lamps, options.frontend.room),
                         options.lamps,
                         read_calibration(options.calibration)};
   const std::optional<Readout>& readout = options.frontend.readout;
   if (readout) captures.calibration.camera.readout = readout;
   captures.frames =
       std::filesystem::is_directory(options.images)
-          ? collect_lamp_frames_of_kept_images(
-                detect_lamps_in_captures(options, use, captures.lamps, captures.calibration).images)
-          : read_captures_from_detections_file(options);
+          ? collect_lamp_frames(
+                detect_captured_lamps(options, use, captures.lamps, captures.calibration).images)
+          : read_detected_captures(options);
   return captures;
 }
 
-std::vector<Frame> read_captures_from_detections_file(const CaptureOptions& options) {
+std::vector<Frame> read_detected_captures(const CaptureOptions& options) {
   if (is_video_file_name(options.images)) {
     throw std::invalid_argument(options.images +
                                 " is a video; use vlp-detect, with --captures for the frame times");

@@ -43,7 +43,7 @@ void print_residuals(const RotationFit& fit, const RotationCaptures& rotation) {
   for (const auto& [index, distance_px] : fit.outliers) {
     const RotationObservation& observation = rotation.observations[index];
     fmt::print("  outlier   {} lamp {}: residual {:.2f} px\n",
-               escape_text_for_single_line(rotation.captures[observation.capture].image),
+               escape_for_line(rotation.captures[observation.capture].image),
                rotation.lamps[observation.lamp].id, distance_px);
   }
 }
@@ -55,8 +55,8 @@ void print_circle(const char* name, const Circle& circle) {
 
 }  // namespace
 
-void print_lens_calibration(const IntrinsicsSolution& solution, const CalibrationReport& report,
-                            const ViewCoverage& coverage, const HeldOutFit& held_out) {
+void print_lens(const IntrinsicsSolution& solution, const CalibrationReport& report,
+                const ViewCoverage& coverage, const HeldOutFit& held_out) {
   const auto& parameters = solution.problem.intrinsics;
   fmt::print("views         {} used, {} rejected\n", solution.views.size(),
              solution.dropped_views.size());
@@ -71,7 +71,7 @@ void print_lens_calibration(const IntrinsicsSolution& solution, const Calibratio
   fmt::print("focal length  {:.2f}, {:.2f} px", parameters[0], parameters[1]);
   if (is_splined_lens_model(solution.problem.lens_model)) {
     fmt::print(", compensated by {} control points\n",
-               spline_grid_of_lens_model(solution.problem.lens_model).num_control_points());
+               spline_grid_of(solution.problem.lens_model).num_control_points());
   } else {
     fmt::print(", sd {:.2f} by noise, {:.2f} by views\n", report.focal_sd_px,
                report.focal_sd_by_views_px);
@@ -102,17 +102,16 @@ void print_lens_calibration(const IntrinsicsSolution& solution, const Calibratio
   fmt::print("coverage      {:.0f} % of the image\n", 100 * coverage.covered_fraction);
   fmt::print("tilts         left {:.0f}, right {:.0f}, upper {:.0f}, lower {:.0f} degrees\n",
              deg_from_rad(left), deg_from_rad(right), deg_from_rad(upper), deg_from_rad(lower));
-  fmt::print("next view     {}\n", recommend_next_board_view(coverage));
+  fmt::print("next view     {}\n", recommend_next_view(coverage));
 }
 
-void print_rotation_center(const Calibration& calibration) {
+void print_center(const Calibration& calibration) {
   const RotationCenter& center = *calibration.rotation_center;
   fmt::print("center      {:.3f} {:.3f} px in the undistorted image{}\n", center.center_px.x(),
-             center.center_px.y(),
-             format_sd(compute_rotation_center_covariance(calibration), 1, "px"));
+             center.center_px.y(), format_sd(compute_center_covariance(calibration), 1, "px"));
   const Eigen::Vector3d& up = center.zenith_in_camera;
   fmt::print("zenith      {:.6f} {:.6f} {:.6f} in the camera\n", up.x(), up.y(), up.z());
-  const auto [angle_rad, azimuth_rad] = compute_tilt_from_rotation_center(center);
+  const auto [angle_rad, azimuth_rad] = compute_tilt(center);
   const auto covariance = find_parameter_covariance(calibration, kZenithParameter);
   fmt::print("tilt        {:.4f} deg towards {:.1f} deg in the image{}\n", deg_from_rad(angle_rad),
              deg_from_rad(azimuth_rad),
@@ -121,8 +120,8 @@ void print_rotation_center(const Calibration& calibration) {
                  : "");
 }
 
-void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& rotation,
-                                const CircleCenters& circles, const Calibration& calibration) {
+void print_rotation(const RotationFit& fit, const RotationCaptures& rotation,
+                    const CircleCenters& circles, const Calibration& calibration) {
   fmt::print("captures    {} of {}\n", rotation.captures.size(),
              rotation.captures.size() + rotation.rejected_captures.size());
   for (const RotationHeight& height : rotation.heights) {
@@ -130,7 +129,7 @@ void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& 
                height.captures, deg_from_rad(height.arc_rad));
   }
   fmt::print("lamps       {}\n", rotation.lamps.size());
-  print_rotation_center(calibration);
+  print_center(calibration);
   print_lever_arm(calibration);
   if (circles.circles.empty()) {
     fmt::print("circles     none determined\n");
@@ -142,13 +141,12 @@ void print_rotation_calibration(const RotationFit& fit, const RotationCaptures& 
   fmt::print("\n{:>10} {:>10}  image\n", "z (m)", "yaw (deg)");
   for (const RotationCapture& capture : rotation.captures) {
     fmt::print("{:>10} {:10.3f}  {}\n", format_height_m(rotation.heights[capture.height].z_m),
-               deg_from_rad(wrap_angle_rad(capture.yaw_rad)),
-               escape_text_for_single_line(capture.image));
+               deg_from_rad(wrap_angle_rad(capture.yaw_rad)), escape_for_line(capture.image));
   }
 }
 
-void print_dispersion_calibration(const DispersionFit& fit, const Calibration& calibration,
-                                  std::size_t captures) {
+void print_dispersion(const DispersionFit& fit, const Calibration& calibration,
+                      std::size_t captures) {
   const Dispersion& found = fit.dispersion;
   fmt::print("captures    {}, {} used, {} rejected as outliers, {} without a fix\n", captures,
              found.captures, static_cast<int>(fit.fixes.size()) - found.captures,
@@ -157,7 +155,7 @@ void print_dispersion_calibration(const DispersionFit& fit, const Calibration& c
   print_circle("after", fit.after);
   fmt::print("offset      {:.4f} {:.4f} px", found.offset_px.x(), found.offset_px.y());
   fmt::print("{}, fixed in the camera\n",
-             format_sd(compute_dispersion_offset_covariance(calibration), 1, "px"));
+             format_sd(compute_offset_covariance(calibration), 1, "px"));
   if (const auto& world_m = fit.world_offset_m) {
     fmt::print(
         "world       {:.3f} {:.3f} mm, sd {:.3f} {:.3f} mm, fixed in the world: lamp map or "
@@ -171,19 +169,18 @@ void print_dispersion_calibration(const DispersionFit& fit, const Calibration& c
   }
 }
 
-void print_lamp_corrections_header() {
+void print_lamp_header() {
   fmt::print("\n{:>10} {:>28} {:>28}\n", "lamp", "correction x y z (mm)", "sd (mm)");
 }
 
-void print_lamp_correction_row(int lamp, const Eigen::Vector3d& correction_m,
-                               const Eigen::Vector3d& sd_m, const char* note) {
+void print_lamp_row(int lamp, const Eigen::Vector3d& correction_m, const Eigen::Vector3d& sd_m,
+                    const char* note) {
   fmt::print("{:10} {:10.3f}{:9.3f}{:9.3f} {:10.3f}{:9.3f}{:9.3f}{}\n", lamp,
              1e3 * correction_m.x(), 1e3 * correction_m.y(), 1e3 * correction_m.z(), 1e3 * sd_m.x(),
              1e3 * sd_m.y(), 1e3 * sd_m.z(), note);
 }
 
-void print_joint_adjustment(const AdjustmentResult& found, const Calibration& before,
-                            bool lens_stated) {
+void print_adjustment(const AdjustmentResult& found, const Calibration& before, bool lens_stated) {
   const RotationCenter& center = found.center;
   const MatrixX covariance = found.center_covariance();
   fmt::print("captures    {} used, {} rejected\n", found.captures, found.rejected_captures);
@@ -225,9 +222,9 @@ void print_joint_adjustment(const AdjustmentResult& found, const Calibration& be
                1e3 * place.residual_m.x(), 1e3 * place.residual_m.y(), 1e3 * place.residual_m.z(),
                place.is_outlier ? ", rejected" : "");
   }
-  print_lamp_corrections_header();
+  print_lamp_header();
   for (const auto& [id, correction_m, sd_m, moved] : found.lamps) {
-    print_lamp_correction_row(id, correction_m, sd_m, moved ? "  differs from the map" : "");
+    print_lamp_row(id, correction_m, sd_m, moved ? "  differs from the map" : "");
   }
 }
 

@@ -92,7 +92,7 @@ void print_line_fit(const LineFit& fit) {
       convert_m_to_mm(statistics.max), convert_m_to_mm(fit.jitter_m), deg_from_rad(fit.angle_rad));
 }
 
-void print_normalized_errors_and_crlb(const Evaluation& evaluation) {
+void print_error_ratios(const Evaluation& evaluation) {
   if (const auto& normalized_errors = evaluation.normalized_errors) {
     fmt::print("error / sd  horizontal {:.3f}", normalized_errors->horizontal);
     if (normalized_errors->height) fmt::print(", height {:.3f}", *normalized_errors->height);
@@ -116,12 +116,12 @@ void print_normalized_errors_and_crlb(const Evaluation& evaluation) {
 }
 
 void print_comparison(const Comparison& comparison) {
-  for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
+  for (std::size_t i = 0; const ComparedQuantity& quantity : list_quantities()) {
     const QuantityComparison& compared = comparison.quantities[i++];
     const double factor = quantity.units_per_si;
     if (compared.pairs == 0 && i > 1) continue;
     fmt::print("{:11} {} {}", i == 1 ? "compared" : "", quantity.name,
-               compared.describe_comparison_result(quantity));
+               compared.describe_result(quantity));
     if (compared.pairs > 0) {
       fmt::print(": mean differs by {:+.3f}{}{}", factor * compared.mean_difference,
                  *quantity.unit == 0 ? "" : " ", quantity.unit);
@@ -139,7 +139,7 @@ void print_comparison(const Comparison& comparison) {
 }
 
 /// Returns the remedy that reduces an error source.
-std::string_view find_remedy(std::string_view key) {
+std::string_view get_remedy(std::string_view key) {
   if (key == "motion") return "odometry, or a faster readout";
   if (key == "roll_pitch") return "an inclination sensor, or a camera that is held level";
   if (key == "lens") return "more views of the board, or vlp-adjust, which corrects the lens";
@@ -152,7 +152,7 @@ std::string_view find_remedy(std::string_view key) {
 
 }  // namespace
 
-void print_position_fix_summary(const FixSummary& summary) {
+void print_fix_summary(const FixSummary& summary) {
   fmt::print("frames      {}\nfixes       {}\n", summary.frames, summary.fixes);
   for (const auto& [status, count] : summary.failures_by_status) {
     fmt::print("  no fix    {} {}\n", count, status);
@@ -170,8 +170,7 @@ void print_position_fix_summary(const FixSummary& summary) {
   }
 }
 
-void print_fix_error_evaluation(const Evaluation& evaluation,
-                                const std::vector<CheckedMetric>& gates) {
+void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates) {
   fmt::print("captures    {}\nfixes       {}\nmissing     {:.3g} %\n", evaluation.captures,
              evaluation.fixes, 100 * evaluation.missing_fix_fraction());
   for (const auto& [status, count] : evaluation.failures_by_status) {
@@ -182,18 +181,17 @@ void print_fix_error_evaluation(const Evaluation& evaluation,
   if (evaluation.bias_and_repeatability)
     print_bias_and_repeatability(*evaluation.bias_and_repeatability);
   if (evaluation.line_fit) print_line_fit(*evaluation.line_fit);
-  print_normalized_errors_and_crlb(evaluation);
+  print_error_ratios(evaluation);
   if (evaluation.comparison) print_comparison(*evaluation.comparison);
   if (!gates.empty()) fmt::print("\n");
   for (const CheckedMetric& gate : gates) {
     fmt::print("{:6} gate {:20} {:>10.4g} {:3} {} {:.4g}\n",
                gate.has_passed_gate() ? "met" : "NOT MET", gate.name, gate.value.value(), gate.unit,
-               describe_limit_direction(gate.direction), gate.limit.value());
+               describe_direction(gate.direction), gate.limit.value());
   }
 }
 
-void print_floor_error_budget(const FloorSummary& summary, const FloorLimits& limits,
-                              bool is_free) {
+void print_floor_budget(const FloorSummary& summary, const FloorLimits& limits, bool is_free) {
   const auto in_view =
       std::count_if(limits.positions.begin(), limits.positions.end(),
                     [](const FloorLimits::Position& place) { return place.lamps > 1; });
@@ -214,10 +212,10 @@ void print_floor_error_budget(const FloorSummary& summary, const FloorLimits& li
   print(summary.total);
 }
 
-void print_largest_error_source(const FloorSummary& summary) {
+void print_largest_source(const FloorSummary& summary) {
   const auto& [name, key] = summary.largest_error_source().source;
   fmt::print("\nimprove     {} first, {:.0f} % of the horizontal variance: {}\n", name,
-             100 * summary.largest_error_source().fraction, find_remedy(key));
+             100 * summary.largest_error_source().fraction, get_remedy(key));
 }
 
 }  // namespace vlp

@@ -13,19 +13,18 @@ namespace vlp {
 
 /// Prints the number of frames with a fix, the reasons why others have none, and the quality of the
 /// fixes to stdout.
-void print_position_fix_summary(const FixSummary& summary);
+void print_fix_summary(const FixSummary& summary);
 
 /// Prints an evaluation and its gates to stdout, human-readable: errors in mm and degrees, gates
 /// with limit and result.
-void print_fix_error_evaluation(const Evaluation& evaluation,
-                                const std::vector<CheckedMetric>& gates);
+void print_evaluation(const Evaluation& evaluation, const std::vector<CheckedMetric>& gates);
 
 /// Prints the error budget of a floor to stdout: the median over the floor and the worst place of
 /// each source. `is_free`: the camera may move or tilt, which two lamps do not determine
 /// everywhere.
-void print_floor_error_budget(const FloorSummary& summary, const FloorLimits& limits, bool is_free);
+void print_floor_budget(const FloorSummary& summary, const FloorLimits& limits, bool is_free);
 
 /// Prints the largest error source and its remedy to stdout.
-void print_largest_error_source(const FloorSummary& summary);
+void print_largest_source(const FloorSummary& summary);
 
 }  // namespace vlp

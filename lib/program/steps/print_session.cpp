@@ -24,16 +24,16 @@ std::optional<double> find_session_metric_value(const SessionResult& result,
 
 }  // namespace
 
-SessionObserver SessionLog::make_session_observer() {
+SessionObserver SessionLog::make_observer() {
   return {[this](const std::string&) { step_start_ = Clock::now(); },
           [this](std::size_t done, std::size_t total) {
             if (!progress_) progress_ = std::make_unique<Progress>("images");
-            progress_->update_progress_display(done, total);
+            progress_->update(done, total);
           },
-          [this](const SessionStep& step) { print_finished_step(step); }};
+          [this](const SessionStep& step) { print_step(step); }};
 }
 
-void SessionLog::print_finished_step(const SessionStep& step) {
+void SessionLog::print_step(const SessionStep& step) {
   progress_.reset();
   const double seconds = std::chrono::duration<double>(Clock::now() - step_start_).count();
   const bool missed = !describe_failed_gates(step.result.gates).empty();
@@ -44,7 +44,7 @@ void SessionLog::print_finished_step(const SessionStep& step) {
   print_step_remarks(step.result);
 }
 
-void print_session_result(const SessionResult& result, const std::string& results) {
+void print_session(const SessionResult& result, const std::string& results) {
   struct MetricRow {
     const char *label, *metric, *unit;
   };
@@ -64,9 +64,9 @@ void print_session_result(const SessionResult& result, const std::string& result
       fmt::print("{:11} {:.4g} {}\n", label, *value, unit);
   }
   for (const CheckedMetric& gate : result.gates) {
-    if (!gate.has_passed_gate()) fmt::print("NOT MET     {}\n", describe_gate_result(gate));
+    if (!gate.has_passed_gate()) fmt::print("NOT MET     {}\n", describe_gate(gate));
   }
-  fmt::print("verdict     {}; results are in {}\n", session_verdict_name(result.verdict), results);
+  fmt::print("verdict     {}; results are in {}\n", verdict_text(result.verdict), results);
 }
 
 }  // namespace vlp

@@ -15,20 +15,20 @@ namespace vlp {
 /// a progress display while it runs.
 class SessionLog {
  public:
-  /// Returns the callbacks that write the log during one call of run_calibration_session(). They
+  /// Returns the callbacks that write the log during one call of run_session(). They
   /// refer to this log, which must outlive the run.
-  SessionObserver make_session_observer();
+  SessionObserver make_observer();
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  void print_finished_step(const SessionStep& step);
+  void print_step(const SessionStep& step);
 
   Clock::time_point step_start_;
   std::unique_ptr<Progress> progress_;
 };
 
 /// Prints the main metrics of a session, its failed gates and the verdict to stdout.
-void print_session_result(const SessionResult& result, const std::string& results);
+void print_session(const SessionResult& result, const std::string& results);
 
 }  // namespace vlp

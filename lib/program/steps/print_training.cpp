@@ -30,13 +30,13 @@ void print_confusion(const ConfusionMatrix& confusion) {
   }
   const int all = confusion.counts.sum();
   fmt::print("correct     {:.2f} %\n  wrong     {}\n  unknown   {}\n",
-             100.0 * confusion.count_correctly_identified_lights() / all,
-             confusion.count_wrongly_identified_lights(), confusion.count_unidentified_lights());
+             100.0 * confusion.count_correct() / all, confusion.count_wrong(),
+             confusion.count_unidentified());
 }
 
 }  // namespace
 
-void print_lamp_classifier_training(const TrainStepResult& result) {
+void print_training(const TrainStepResult& result) {
   print_labeled_lights(result.labeled, result.classifier);
   print_confusion(result.confusion);
 }

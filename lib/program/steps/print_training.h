@@ -9,7 +9,7 @@
 namespace vlp {
 
 /// Prints the training data of a classifier and its cross-validated answers to stdout.
-void print_lamp_classifier_training(const TrainStepResult& result);
+void print_training(const TrainStepResult& result);
 
 /// Prints the estimated row time and its standard deviation, in us, to stdout. Also prints the
 /// number of lights and lamps that determine it, and the readout direction.

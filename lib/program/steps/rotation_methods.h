@@ -21,12 +21,11 @@ struct TiltOptions {
 
 /// Estimates the tilt of the camera from captures taken anywhere (calibration/tilt/), for
 /// vlp-rotation --method lamps.
-void run_tilt_calibration_program(const CLI::App& app, CaptureOptions images,
-                                  const TiltOptions& options);
+void run_tilt_program(const CLI::App& app, CaptureOptions images, const TiltOptions& options);
 
 /// Estimates the rotation center from captures of a rotation in place (calibration/rotation/), for
 /// vlp-rotation --method axis|circle. `plot` is the file of the plot; empty: none.
-void run_rotation_center_program(const CLI::App& app, CaptureOptions images,
-                                 const std::string& method, const std::string& plot);
+void run_rotation_program(const CLI::App& app, CaptureOptions images, const std::string& method,
+                          const std::string& plot);
 
 }  // namespace vlp

@@ -17,8 +17,8 @@ namespace vlp {
 
 namespace {
 
-bool does_option_affect_result(const CLI::Option& option) {
-  const auto excluded = list_options_omitted_from_history();
+bool is_result_option(const CLI::Option& option) {
+  const auto excluded = list_omitted_options();
   return std::find(excluded.begin(), excluded.end(), option.get_name()) == excluded.end();
 }
 
@@ -28,14 +28,13 @@ bool is_output_option(const CLI::Option& option) { return option.get_name() == "
 std::string format_options(const CLI::App& app, const std::vector<std::string>& inputs) {
   std::string text;
   for (const CLI::Option* option : app.get_options()) {
-    if (option->count() == 0 || option->get_positional() || !does_option_affect_result(*option))
-      continue;
+    if (option->count() == 0 || option->get_positional() || !is_result_option(*option)) continue;
     text += (text.empty() ? "" : " ") + option->get_name();
     if (option->get_items_expected_max() == 0) continue;  // a flag
     for (const std::string& value : option->results()) {
       const bool file = is_output_option(*option) ||
                         std::find(inputs.begin(), inputs.end(), value) != inputs.end();
-      text += " " + (file ? last_path_component(value) : value);
+      text += " " + (file ? last_component(value) : value);
     }
   }
   return text;
@@ -52,14 +51,14 @@ void print_step_remarks(const StepResult& result) {
   for (const std::string& detail : result.details) spdlog::debug("{}", detail);
 }
 
-void throw_if_step_failed(const StepResult& result) {
+void require_success(const StepResult& result) {
   if (result.has_succeeded()) return;
   if (result.failure == StepFailure::undetermined)
     throw Undetermined(format_failure_message(result));
   throw std::invalid_argument(format_failure_message(result));
 }
 
-std::span<const std::string_view> list_options_omitted_from_history() {
+std::span<const std::string_view> list_omitted_options() {
   static constexpr std::array<std::string_view, 15> excluded = {
       "--output",  "--plot",   "--annotate", "--threads", "--quiet",
       "--verbose", "--cache",  "--ros",      "--corners", "--kalibr",
@@ -67,11 +66,10 @@ std::span<const std::string_view> list_options_omitted_from_history() {
   return excluded;
 }
 
-HistoryEntry make_history_entry_from_command_line(const CLI::App& app,
-                                                  const std::vector<std::string>& inputs) {
+HistoryEntry make_command_entry(const CLI::App& app, const std::vector<std::string>& inputs) {
   InputDigests digests;
-  return make_calibration_history_entry({app.get_name(), VLP_VERSION}, format_options(app, inputs),
-                                        {inputs.begin(), inputs.end()}, digests);
+  return make_history_entry({app.get_name(), VLP_VERSION}, format_options(app, inputs),
+                            {inputs.begin(), inputs.end()}, digests);
 }
 
 }  // namespace vlp

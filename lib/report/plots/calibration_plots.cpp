@@ -17,29 +17,29 @@
 namespace vlp {
 namespace {
 
-std::string make_point_data_block(const std::string& name,
-                                  const std::vector<Eigen::Vector2d>& errors_m) {
+std::string make_point_block(const std::string& name,
+                             const std::vector<Eigen::Vector2d>& errors_m) {
   std::string rows;
   for (const auto& error_m : errors_m)
-    rows += format_gnuplot_data_row({1e3 * error_m.x(), 1e3 * error_m.y()});
-  return make_gnuplot_data_block(name, rows);
+    rows += format_data_row({1e3 * error_m.x(), 1e3 * error_m.y()});
+  return make_data_block(name, rows);
 }
 
 /// Returns a circle and the corners of its bounding box, because gnuplot's autoscaling ignores
 /// circles.
-std::string make_circle_data_blocks(const std::string& name, const Circle& circle_m) {
+std::string make_circle_blocks(const std::string& name, const Circle& circle_m) {
   const Eigen::Vector2d half(circle_m.radius, circle_m.radius);
   const std::vector<Eigen::Vector2d> corners{circle_m.center - half, circle_m.center + half};
-  return make_gnuplot_data_block(
-             name, format_gnuplot_data_row({1e3 * circle_m.center.x(), 1e3 * circle_m.center.y(),
-                                            1e3 * circle_m.radius})) +
-         make_point_data_block(name + "_box", corners);
+  return make_data_block(name,
+                         format_data_row({1e3 * circle_m.center.x(), 1e3 * circle_m.center.y(),
+                                          1e3 * circle_m.radius})) +
+         make_point_block(name + "_box", corners);
 }
 
 /// Returns the plot clauses of points with their circle and its center.
 std::string make_gnuplot_layer(const std::string& name, const std::string& color,
                                const std::string& marker, const std::string& dashes) {
-  const std::string style = make_gnuplot_color_clause(color);
+  const std::string style = make_color_clause(color);
   return "$" + name + "_circle using 1:2:3 with circles linewidth 1.5 dashtype " + dashes + style +
          "notitle, " + "$" + name + "_circle_box using 1:2 with points pointtype -1 notitle, $" +
          name + "_circle using 1:2 with points pointtype 2 pointsize 1.5 linewidth 2" + style +
@@ -57,11 +57,11 @@ std::string format_square_range(const Eigen::AlignedBox2d& box) {
 }
 
 /// Returns the data blocks: corners and outliers as u v du dv, and the map as u v sd.
-std::string format_intrinsics_data(const IntrinsicsPlot& plot) {
+std::string format_data(const IntrinsicsPlot& plot) {
   std::string corners, outliers, map;
   for (const auto& [seen_px, residual_px, outlier] : plot.corners) {
     (outlier ? outliers : corners) +=
-        format_gnuplot_data_row({seen_px.x(), seen_px.y(), residual_px.x(), residual_px.y()});
+        format_data_row({seen_px.x(), seen_px.y(), residual_px.x(), residual_px.y()});
   }
   const auto [width, height] = plot.imager_px;
   const auto cols = static_cast<std::size_t>(plot.cols), rows = plot.sd_px.size() / cols;
@@ -70,14 +70,14 @@ std::string format_intrinsics_data(const IntrinsicsPlot& plot) {
     for (std::size_t col = 0; col < cols; ++col) {
       const double u = (width - 1) * double(col) / double(cols - 1);
       const double sd_px = plot.sd_px[row * cols + col];
-      map += std::isfinite(sd_px) ? format_gnuplot_data_row({u, v, sd_px})
-                                  : format_significant_digits(u, kPlotDigits) + " " +
-                                        format_significant_digits(v, kPlotDigits) + " NaN\n";
+      map += std::isfinite(sd_px)
+                 ? format_data_row({u, v, sd_px})
+                 : format_digits(u, kPlotDigits) + " " + format_digits(v, kPlotDigits) + " NaN\n";
     }
     map += "\n";
   }
-  return make_gnuplot_data_block("corners", corners) +
-         make_gnuplot_data_block("outliers", outliers) + make_gnuplot_data_block("map", map);
+  return make_data_block("corners", corners) + make_data_block("outliers", outliers) +
+         make_data_block("map", map);
 }
 
 /// Returns, for example, "12 corners, 3 outliers (crosses)".
@@ -91,8 +91,8 @@ std::string describe_counts(const IntrinsicsPlot& plot, const std::string& outli
 }
 
 /// Returns the plot commands of the corners, and of the outliers if there are any.
-std::string format_plot_commands(const IntrinsicsPlot& plot, const std::string& corner_style,
-                                 const std::string& outlier_style) {
+std::string format_commands(const IntrinsicsPlot& plot, const std::string& corner_style,
+                            const std::string& outlier_style) {
   std::string layers =
       "plot $corners " + corner_style + " linecolor rgb '" + plot_colors::blue + "' notitle";
   if (std::any_of(plot.corners.begin(), plot.corners.end(),
@@ -126,7 +126,7 @@ std::string format_sd_map(const IntrinsicsPlot& plot) {
   const auto levels = list_1_2_5_series(min_sd_px, max_sd_px);
   std::string tics, lines;
   for (const double level : levels) {
-    const std::string text = format_significant_digits(level, kPlotDigits);
+    const std::string text = format_digits(level, kPlotDigits);
     tics.append(tics.empty() ? "" : ",").append(text);
     if (level > min_sd_px && level < max_sd_px) lines.append(lines.empty() ? "" : ",").append(text);
   }
@@ -136,12 +136,12 @@ std::string format_sd_map(const IntrinsicsPlot& plot) {
                "\nset table $lines\nsplot $map using 1:2:3\nunset table\nunset contour\n";
   }
   const auto rows = plot.sd_px.size() / static_cast<std::size_t>(plot.cols);
-  const std::string half_u = format_significant_digits(
-                        (plot.imager_px[0] - 1) / 2.0 / (plot.cols - 1), kPlotDigits),
-                    half_v = format_significant_digits(
-                        (plot.imager_px[1] - 1) / 2.0 / double(rows - 1), kPlotDigits);
-  commands += "set cbrange [" + format_significant_digits(levels.front(), kPlotDigits) + ":" +
-              format_significant_digits(levels.back(), kPlotDigits) + "]\nset cbtics (" + tics +
+  const std::string half_u =
+                        format_digits((plot.imager_px[0] - 1) / 2.0 / (plot.cols - 1), kPlotDigits),
+                    half_v = format_digits((plot.imager_px[1] - 1) / 2.0 / double(rows - 1),
+                                           kPlotDigits);
+  commands += "set cbrange [" + format_digits(levels.front(), kPlotDigits) + ":" +
+              format_digits(levels.back(), kPlotDigits) + "]\nset cbtics (" + tics +
               ")\nset logscale cb\n"
               "plot $map using 1:2:(" +
               half_u + "):(" + half_v +
@@ -173,26 +173,25 @@ std::string format_mtf50_map(const IntrinsicsPlot& plot) {
   for (std::size_t i = 0; i < plot.mtf50.size(); ++i) {
     if (!std::isfinite(plot.mtf50[i])) continue;
     const std::size_t col = i % cols, row = i / cols;
-    map += format_gnuplot_data_row({(2 * double(col) + 1) * half_u - 0.5,
-                                    (2 * double(row) + 1) * half_v - 0.5, plot.mtf50[i]});
+    map += format_data_row({(2 * double(col) + 1) * half_u - 0.5,
+                            (2 * double(row) + 1) * half_v - 0.5, plot.mtf50[i]});
   }
-  return make_gnuplot_data_block("mtf50", map) + "set title " +
-         quote_text_for_gnuplot("sharpness: MTF50 of lens and pixel\ncycles per pixel") +
+  return make_data_block("mtf50", map) + "set title " +
+         quote_for_gnuplot("sharpness: MTF50 of lens and pixel\ncycles per pixel") +
          "\nunset logscale cb\nset cbrange [0:*]\nset cbtics autofreq\nplot $mtf50 using 1:2:(" +
-         format_significant_digits(half_u, kPlotDigits) + "):(" +
-         format_significant_digits(half_v, kPlotDigits) +
+         format_digits(half_u, kPlotDigits) + "):(" + format_digits(half_v, kPlotDigits) +
          "):3 with boxxyerror fillstyle solid linecolor palette notitle\n";
 }
 
 }  // namespace
 
-Drawing make_dispersion_plot_drawing(const DispersionPlot& plot) {
-  std::string commands = make_point_data_block("before", plot.before.errors_m) +
-                         make_circle_data_blocks("before_circle", plot.before.circle) +
-                         make_point_data_block("after", plot.after.errors_m) +
-                         make_circle_data_blocks("after_circle", plot.after.circle) +
-                         make_point_data_block("outliers", plot.outliers_m) +
-                         make_common_gnuplot_settings() + make_gnuplot_title_command(plot.title) +
+Drawing draw_dispersion(const DispersionPlot& plot) {
+  std::string commands = make_point_block("before", plot.before.errors_m) +
+                         make_circle_blocks("before_circle", plot.before.circle) +
+                         make_point_block("after", plot.after.errors_m) +
+                         make_circle_blocks("after_circle", plot.after.circle) +
+                         make_point_block("outliers", plot.outliers_m) + make_settings() +
+                         make_gnuplot_title_command(plot.title) +
                          "set xlabel 'fix minus reference point, x (mm)'\n"
                          "set ylabel 'y (mm)'\n"
                          "set size ratio -1\n"
@@ -213,19 +212,19 @@ Drawing make_dispersion_plot_drawing(const DispersionPlot& plot) {
   return {"dispersion", 720, 720, commands};
 }
 
-Drawing make_rotation_plot_drawing(const RotationPlot& plot) {
+Drawing draw_rotation(const RotationPlot& plot) {
   std::string places, ellipses, labels;
   std::set<int> labeled;
   Eigen::AlignedBox2d image, centers(plot.rotation_center_px);
   centers.extend(plot.principal_point_px);
   for (const auto& [lamp, places_px, center_px, radii_px] : plot.traces) {
     for (const auto& place : places_px)
-      places += format_gnuplot_data_row({place.x(), place.y(), double(lamp)});
-    ellipses += format_gnuplot_data_row(
+      places += format_data_row({place.x(), place.y(), double(lamp)});
+    ellipses += format_data_row(
         {center_px.x(), center_px.y(), 2 * radii_px.x(), 2 * radii_px.y(), double(lamp)});
     // One label per lamp, although it has an ellipse at each height.
     if (labeled.insert(lamp).second) {
-      labels += format_gnuplot_data_row({center_px.x(), center_px.y(), double(lamp)});
+      labels += format_data_row({center_px.x(), center_px.y(), double(lamp)});
     }
     image.extend(center_px - radii_px).extend(center_px + radii_px);
     centers.extend(center_px);
@@ -237,19 +236,18 @@ Drawing make_rotation_plot_drawing(const RotationPlot& plot) {
       "$axis using 1:2 with points pointtype 2 pointsize 2 linewidth 2 linecolor rgb '#d55e00' "
       "title 'rotation center'\n";
   const std::string commands =
-      make_gnuplot_data_block("places", places) + make_gnuplot_data_block("ellipses", ellipses) +
-      make_gnuplot_data_block("labels", labels) +
-      make_gnuplot_data_block("axis", format_gnuplot_data_row({axis.x(), axis.y()})) +
-      make_gnuplot_data_block("principal",
-                              format_gnuplot_data_row({principal.x(), principal.y()})) +
-      make_common_gnuplot_settings() +
+      make_data_block("places", places) + make_data_block("ellipses", ellipses) +
+      make_data_block("labels", labels) +
+      make_data_block("axis", format_data_row({axis.x(), axis.y()})) +
+      make_data_block("principal", format_data_row({principal.x(), principal.y()})) +
+      make_settings() +
       "set size ratio -1\n"
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
       "unset colorbox\n"
       "set palette defined (0 '#440154', 1 '#3b528b', 2 '#21918c', 3 '#5ec962', 4 '#e0b000')\n"
       "set multiplot layout 1,2 title " +
-      quote_text_for_gnuplot(plot.title) +
+      quote_for_gnuplot(plot.title) +
       " noenhanced\n"
       "set title 'lamps while turning, undistorted image'\n" +
       format_square_range(image.extend(centers)) +
@@ -263,66 +261,61 @@ Drawing make_rotation_plot_drawing(const RotationPlot& plot) {
   return {"rotation", 1000, 560, commands};
 }
 
-double choose_residual_magnification(double rms_px, int width_px) {
-  return rms_px > 0 ? round_down_to_1_2_5_series(width_px / 40.0 / rms_px) : 1;
+double choose_residual_scale(double rms_px, int width_px) {
+  return rms_px > 0 ? round_down_to_1_2_5(width_px / 40.0 / rms_px) : 1;
 }
 
-Drawing make_intrinsics_plot_drawing(const IntrinsicsPlot& plot) {
+Drawing draw_intrinsics(const IntrinsicsPlot& plot) {
   assert(plot.cols >= 2 && plot.sd_px.size() >= 2 * static_cast<std::size_t>(plot.cols));
   const auto [width, height] = plot.imager_px;
-  const std::string times =
-      format_significant_digits(choose_residual_magnification(rms_px(plot), width), kPlotDigits);
+  const std::string times = format_digits(choose_residual_scale(rms_px(plot), width), kPlotDigits);
   const std::string arrows =
       "using 1:2:($3 * " + times + "):($4 * " + times + ") with vectors nohead ";
   const std::string dots = "using 1:2 with points pointtype 7 pointsize 0.18";
   const std::string commands =
-      format_intrinsics_data(plot) + make_common_gnuplot_settings() +
+      format_data(plot) + make_settings() +
       "set size ratio -1\n"
       "set xrange [-0.5:" +
-      format_significant_digits(width - 0.5, kPlotDigits) +
+      format_digits(width - 0.5, kPlotDigits) +
       "]\n"
       "set yrange [" +
-      format_significant_digits(height - 0.5, kPlotDigits) +
+      format_digits(height - 0.5, kPlotDigits) +
       ":-0.5]\n"  // v downwards, as in the image
       "set xlabel 'u (px)'\n"
       "set ylabel 'v (px)'\n"
       "set multiplot layout 2,2 margins 0.1,0.88,0.09,0.88 spacing 0.22,0.2 title " +
-      quote_text_for_gnuplot(plot.title) +
+      quote_for_gnuplot(plot.title) +
       " noenhanced\n"
       "set title " +
-      quote_text_for_gnuplot("corners of all views\n" + describe_counts(plot, " (crosses)")) +
-      "\n" +
-      format_plot_commands(plot, dots,
-                           "using 1:2 with points pointtype 2 pointsize 1.2 linewidth 2") +
+      quote_for_gnuplot("corners of all views\n" + describe_counts(plot, " (crosses)")) + "\n" +
+      format_commands(plot, dots, "using 1:2 with points pointtype 2 pointsize 1.2 linewidth 2") +
       "set title " +
-      quote_text_for_gnuplot("residuals, seen minus projected, " + times + " times as long\n" +
-                             describe_counts(plot, " (thick)")) +
+      quote_for_gnuplot("residuals, seen minus projected, " + times + " times as long\n" +
+                        describe_counts(plot, " (thick)")) +
       "\n" +
-      format_plot_commands(
+      format_commands(
           plot, dots + " linecolor rgb '#0072b2' notitle, $corners " + arrows + "linewidth 0.5",
           arrows + "linewidth 2") +
-      "set title " +
-      quote_text_for_gnuplot("uncertainty of the projection\nstandard deviation (px)") + "\n" +
-      format_sd_map(plot) + format_mtf50_map(plot) + "unset multiplot\n";
+      "set title " + quote_for_gnuplot("uncertainty of the projection\nstandard deviation (px)") +
+      "\n" + format_sd_map(plot) + format_mtf50_map(plot) + "unset multiplot\n";
   return {"intrinsics", 1000, 280 + 720 * height / width, commands};
 }
 
-IntrinsicsPlot collect_intrinsics_plot_data(const std::string& title,
-                                            const IntrinsicsSolution& solution,
-                                            const BoardLattice& lattice,
-                                            const std::optional<LensSharpness>& sharpness) {
+IntrinsicsPlot make_intrinsics_plot(const std::string& title, const IntrinsicsSolution& solution,
+                                    const BoardLattice& lattice,
+                                    const std::optional<LensSharpness>& sharpness) {
   const BoardProblem& problem = solution.problem;
   IntrinsicsPlot plot{title, problem.imager_px, {}, 0, {}};
-  const auto residuals_px = compute_reprojection_residuals(problem);
+  const auto residuals_px = compute_board_residuals(problem);
   for (std::size_t i = 0; i < residuals_px.size(); ++i) {
     if (!residuals_px[i].allFinite()) continue;
     const Eigen::Vector3d& point = problem.points[i];
     plot.corners.push_back({point.head<2>(), residuals_px[i], point.z() <= 0});
   }
   const ProjectionUncertainty uncertainty(solution, lattice);
-  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(problem.imager_px)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(problem.imager_px)) {
     if (pixel.y() == 0) ++plot.cols;
-    plot.sd_px.push_back(uncertainty.projection_sd_along_worst_direction_px(pixel));
+    plot.sd_px.push_back(uncertainty.worst_direction_sd_px(pixel));
   }
   if (sharpness) {
     plot.mtf50_cols = sharpness->mtf50.cols;
@@ -331,30 +324,28 @@ IntrinsicsPlot collect_intrinsics_plot_data(const std::string& title,
   return plot;
 }
 
-RotationPlot collect_rotation_plot_data(const std::string& title, const RotationCaptures& rotation,
-                                        const CircleCenters& circles, const RotationFit& fit,
-                                        const Camera& camera) {
-  RotationPlot plot{title,
-                    {},
-                    fit.center.center_px,
-                    undistorted_pixel_from_normalized_point(camera, Eigen::Vector2d::Zero())};
+RotationPlot make_rotation_plot(const std::string& title, const RotationCaptures& rotation,
+                                const CircleCenters& circles, const RotationFit& fit,
+                                const Camera& camera) {
+  RotationPlot plot{
+      title, {}, fit.center.center_px, ideal_pixel_from_point(camera, Eigen::Vector2d::Zero())};
   for (const auto& [lamp, height, circle] : circles.circles) {
     const Eigen::Vector2d radii_px = camera.focal_px();
     plot.traces.push_back({rotation.lamps[lamp].id,
                            {},
-                           undistorted_pixel_from_normalized_point(camera, circle.circle.center),
+                           ideal_pixel_from_point(camera, circle.circle.center),
                            circle.circle.radius * radii_px});
     for (const RotationObservation& observation : rotation.observations) {
       if (observation.lamp != lamp || rotation.captures[observation.capture].height != height)
         continue;
       plot.traces.back().positions_px.push_back(
-          undistorted_pixel_from_normalized_point(camera, observation.ray.hnormalized()));
+          ideal_pixel_from_point(camera, observation.ray.hnormalized()));
     }
   }
   return plot;
 }
 
-DispersionPlot collect_dispersion_plot_data(const std::string& title, const DispersionFit& fit) {
+DispersionPlot make_dispersion_plot(const std::string& title, const DispersionFit& fit) {
   DispersionPlot plot{title, {{}, fit.before}, {{}, fit.after}, {}};
   for (const auto& fix : fit.fixes) {
     if (fix.used) {

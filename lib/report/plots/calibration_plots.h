@@ -32,7 +32,7 @@ struct DispersionPlot {
 };
 
 /// Makes the plot, in millimeters, for write_plot().
-Drawing make_dispersion_plot_drawing(const DispersionPlot& plot);
+Drawing draw_dispersion(const DispersionPlot& plot);
 
 /// Lamps in the undistorted image while the camera rotates in place: figure 4 of Chen and Guan.
 struct RotationPlot {
@@ -51,7 +51,7 @@ struct RotationPlot {
 
 /// Makes the plot for write_plot(): the traces, and next to them, enlarged, the centers of the
 /// ellipses, the rotation center and the principal point.
-Drawing make_rotation_plot_drawing(const RotationPlot& plot);
+Drawing draw_rotation(const RotationPlot& plot);
 
 /// Residuals and uncertainty of a lens calibration over the image.
 struct IntrinsicsPlot {
@@ -81,26 +81,25 @@ struct IntrinsicsPlot {
 ///
 /// The factor is a round number (1, 2 or 5 times a power of ten) that makes the RMS 1/100 to 1/40
 /// of the width. 1 if there are no residuals.
-double choose_residual_magnification(double rms_px, int width_px);
+double choose_residual_scale(double rms_px, int width_px);
 
 /// Makes the plot for write_plot(): maps of the corners, of their enlarged residuals, of the
 /// standard deviation of the projection, and of the MTF50 if it was measured.
-Drawing make_intrinsics_plot_drawing(const IntrinsicsPlot& plot);
+Drawing draw_intrinsics(const IntrinsicsPlot& plot);
 
 /// Collects corners and residuals of a solution, and the uncertainty of its projection. Includes
 /// the sharpness if it was measured. `lattice` is that of the solution's boards.
 /// @pre solution.has_succeeded()
-IntrinsicsPlot collect_intrinsics_plot_data(const std::string& title,
-                                            const IntrinsicsSolution& solution,
-                                            const BoardLattice& lattice,
-                                            const std::optional<LensSharpness>& sharpness);
+IntrinsicsPlot make_intrinsics_plot(const std::string& title, const IntrinsicsSolution& solution,
+                                    const BoardLattice& lattice,
+                                    const std::optional<LensSharpness>& sharpness);
 
 /// Collects the lamps of a rotation in place with their circles, and the rotation center.
-RotationPlot collect_rotation_plot_data(const std::string& title, const RotationCaptures& rotation,
-                                        const CircleCenters& circles, const RotationFit& fit,
-                                        const Camera& camera);
+RotationPlot make_rotation_plot(const std::string& title, const RotationCaptures& rotation,
+                                const CircleCenters& circles, const RotationFit& fit,
+                                const Camera& camera);
 
 /// Collects the fixes at a known reference point, before and after the correction.
-DispersionPlot collect_dispersion_plot_data(const std::string& title, const DispersionFit& fit);
+DispersionPlot make_dispersion_plot(const std::string& title, const DispersionFit& fit);
 
 }  // namespace vlp

@@ -76,9 +76,9 @@ struct Scale {
     if (extent.isEmpty()) extent.extend(Eigen::Vector2d::Zero());
     constexpr double min_m = 1e-3;
     width_m = std::max(extent.sizes().maxCoeff(), min_m);
-    magnification = choose_error_magnification(p90_m, width_m);
+    magnification = choose_error_scale(p90_m, width_m);
   }
-  double find_longest_arrow_m() const { return kLongestShare * width_m / magnification; }
+  double compute_longest_arrow_m() const { return kLongestShare * width_m / magnification; }
 };
 
 /// Data blocks of the plot. The constructor extends `scale.paper` by the arrows.
@@ -86,54 +86,53 @@ struct Blocks {
   std::string arrows, cut, places, missing, lamps;
 
   Blocks(const ErrorPlot& plot, std::size_t step, Scale& scale) {
-    for (const std::size_t i :
-         select_every_nth_and_largest(compute_lengths_m(plot), step, step > 1 ? kFurthest : 0)) {
+    for (const std::size_t i : thin_out(compute_lengths_m(plot), step, step > 1 ? kFurthest : 0)) {
       const Eigen::Vector2d& from_m = plot.fixes[i].truth_m;
-      const double length_m = error_m(plot.fixes[i]), longest_m = scale.find_longest_arrow_m();
+      const double length_m = error_m(plot.fixes[i]), longest_m = scale.compute_longest_arrow_m();
       Eigen::Vector2d arrow_m = scale.magnification * (plot.fixes[i].fix_m - from_m);
       if (length_m > longest_m) arrow_m *= longest_m / length_m;
       (length_m > longest_m ? cut : arrows) +=
-          format_gnuplot_data_row({from_m.x(), from_m.y(), arrow_m.x(), arrow_m.y()});
-      places += format_gnuplot_data_row({from_m.x(), from_m.y()});
+          format_data_row({from_m.x(), from_m.y(), arrow_m.x(), arrow_m.y()});
+      places += format_data_row({from_m.x(), from_m.y()});
       scale.extent.extend(from_m + arrow_m);
     }
     const std::size_t missing_step = compute_thinning_step(plot.missing_m.size(), kMaxMissing);
     for (std::size_t i = 0; i < plot.missing_m.size(); i += missing_step) {
-      missing += format_gnuplot_data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
+      missing += format_data_row({plot.missing_m[i].x(), plot.missing_m[i].y()});
     }
     for (const Lamp& lamp : plot.lamps.lamps) {
-      lamps += format_gnuplot_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
+      lamps += format_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
     }
   }
   std::string text() const {
-    return make_gnuplot_data_block("arrows", arrows) + make_gnuplot_data_block("cut", cut) +
-           make_gnuplot_data_block("places", places) + make_gnuplot_data_block("missing", missing) +
-           make_gnuplot_data_block("lamps", lamps);
+    return make_data_block("arrows", arrows) + make_data_block("cut", cut) +
+           make_data_block("places", places) + make_data_block("missing", missing) +
+           make_data_block("lamps", lamps);
   }
 };
 
 /// Returns a scale bar at the lower left, in the space below the plan.
 std::string make_scale_bar(const Scale& scale, const Eigen::Vector2d& from_m) {
   if (!(scale.p90_m > 0)) return "";
-  const double length_m = round_down_to_1_2_5_series(1.5 * scale.p90_m);
+  const double length_m = round_down_to_1_2_5(1.5 * scale.p90_m);
   const auto at = [&](double x_m) {
-    return format_significant_digits(x_m, 7) + "," + format_significant_digits(from_m.y(), 7);
+    return format_digits(x_m, 7) + "," + format_digits(from_m.y(), 7);
   };
   const double end_m = from_m.x() + scale.magnification * length_m;
   return "set arrow from " + at(from_m.x()) + " to " + at(end_m) +
-         " heads size graph 0.01,90 linewidth 2 front\nset label '" +
-         format_length_with_mm_unit(length_m) + "' at " + at(end_m) + " offset 1,0 front\n";
+         " heads size graph 0.01,90 linewidth 2 front\nset label '" + format_with_mm(length_m) +
+         "' at " + at(end_m) + " offset 1,0 front\n";
 }
 
-std::string format_plot_commands(const ErrorPlot& plot, const Blocks& blocks, const Scale& scale) {
+std::string format_commands(const ErrorPlot& plot, const Blocks& blocks, const Scale& scale) {
   const std::string arrow =
       " using 1:2:3:4 with vectors filled head size graph 0.012,20 linewidth ";
   const auto cut = std::count_if(plot.fixes.begin(), plot.fixes.end(), [&](const auto& fix) {
-    return error_m(fix) > scale.find_longest_arrow_m();
+    return error_m(fix) > scale.compute_longest_arrow_m();
   });
   std::vector<std::string> layers;
   if (!blocks.arrows.empty()) {
-    layers.push_back("$arrows" + arrow + "1.3" + make_gnuplot_color_clause(plot_colors::blue) +
+    layers.push_back("$arrows" + arrow + "1.3" + make_color_clause(plot_colors::blue) +
                      "title 'error of a fix'");
   }
   if (!blocks.places.empty()) {
@@ -142,21 +141,20 @@ std::string format_plot_commands(const ErrorPlot& plot, const Blocks& blocks, co
         "'truth'");
   }
   if (cut > 0) {
-    layers.push_back("$cut" + arrow + "1.5 dashtype 2" +
-                     make_gnuplot_color_clause(plot_colors::vermilion) + "title '" +
-                     std::to_string(cut) + " beyond " +
-                     format_length_with_mm_unit(scale.find_longest_arrow_m()) + ", cut short'");
+    layers.push_back("$cut" + arrow + "1.5 dashtype 2" + make_color_clause(plot_colors::vermilion) +
+                     "title '" + std::to_string(cut) + " beyond " +
+                     format_with_mm(scale.compute_longest_arrow_m()) + ", cut short'");
   }
   if (!blocks.missing.empty()) {
     const std::size_t count = plot.missing_m.size(),
                       step = compute_thinning_step(count, kMaxMissing);
     layers.push_back("$missing using 1:2 with points pointtype 2 linewidth 2" +
-                     make_gnuplot_color_clause(plot_colors::vermilion) + "title 'no fix: " +
+                     make_color_clause(plot_colors::vermilion) + "title 'no fix: " +
                      (step == 1 ? std::to_string(count) : describe_thinning(count, step)) + "'");
   }
   if (!blocks.lamps.empty()) {
     layers.push_back("$lamps using 1:2 with points pointtype 6 pointsize 1.6 linewidth 2" +
-                     make_gnuplot_color_clause(plot_colors::gray) +
+                     make_color_clause(plot_colors::gray) +
                      "title 'lamps', $lamps using 1:2:(sprintf('%d', int($3))) with labels left "
                      "offset 1,0.7 notitle");
   }
@@ -173,30 +171,29 @@ constexpr std::array<const char*, 4> kColors = {plot_colors::blue, plot_colors::
 std::string format_cdf_steps(std::vector<double> errors_m) {
   std::sort(errors_m.begin(), errors_m.end());
   const std::size_t count = errors_m.size(), steps = std::min(count, kMaxSteps);
-  std::string rows = format_gnuplot_data_row({0, 0});
+  std::string rows = format_data_row({0, 0});
   for (std::size_t i = 1; i <= steps; ++i) {
     const std::size_t rank = count * i / steps;
-    rows += format_gnuplot_data_row({1e3 * errors_m[rank - 1], 100 * double(rank) / double(count)});
+    rows += format_data_row({1e3 * errors_m[rank - 1], 100 * double(rank) / double(count)});
   }
   return rows;
 }
 
 /// Returns the data blocks of a curve: its steps and its two marks.
-std::string format_cdf_data_blocks(const CdfPlot::Curve& curve, const std::string& number) {
-  return make_gnuplot_data_block("curve" + number, format_cdf_steps(curve.errors_m)) +
-         make_gnuplot_data_block("marks" + number,
-                                 format_gnuplot_data_row({1e3 * curve.p50_m, 50}) +
-                                     format_gnuplot_data_row({1e3 * curve.p90_m, 90}));
+std::string format_cdf_blocks(const CdfPlot::Curve& curve, const std::string& number) {
+  return make_data_block("curve" + number, format_cdf_steps(curve.errors_m)) +
+         make_data_block("marks" + number, format_data_row({1e3 * curve.p50_m, 50}) +
+                                               format_data_row({1e3 * curve.p90_m, 90}));
 }
 
 std::string format_layer(const CdfPlot::Curve& curve, std::size_t i) {
   const std::string number = std::to_string(i),
-                    color = make_gnuplot_color_clause(kColors[i % kColors.size()]),
+                    color = make_color_clause(kColors[i % kColors.size()]),
                     style = " dashtype " + std::to_string(i + 1) + color,
-                    label = curve.label + ": p50 " + format_length_in_mm(curve.p50_m) +
-                            " mm, p90 " + format_length_in_mm(curve.p90_m) + " mm";
+                    label = curve.label + ": p50 " + format_mm(curve.p50_m) + " mm, p90 " +
+                            format_mm(curve.p90_m) + " mm";
   return "$curve" + number + " using 1:2 with steps linewidth 2.5" + style + "title " +
-         quote_text_for_gnuplot(label) + " noenhanced, $marks" + number +
+         quote_for_gnuplot(label) + " noenhanced, $marks" + number +
          " using 1:2 with points pointtype " + std::to_string(5 + 2 * (i % kColors.size())) +
          " pointsize 1.3" + color + "notitle";
 }
@@ -219,15 +216,15 @@ struct LineFrame {
 /// Returns x and y in the world, meters along the commanded line, and millimeters to its left.
 std::string format_row(const LineFrame& frame, const Eigen::Vector2d& point_m) {
   const Eigen::Vector2d in_line_m = frame.to_line_frame(point_m);
-  return format_gnuplot_data_row({point_m.x(), point_m.y(), in_line_m.x(), 1e3 * in_line_m.y()});
+  return format_data_row({point_m.x(), point_m.y(), in_line_m.x(), 1e3 * in_line_m.y()});
 }
 
 /// Returns the plot command of commanded line, fixes and fitted line for these data columns.
-std::string format_plot_commands(const std::string& columns) {
+std::string format_commands(const std::string& columns) {
   return "plot $commanded using " + columns + " with lines linewidth 2 linecolor rgb 'black' " +
          "title 'commanded', $fixes using " + columns + " with points pointtype 7 pointsize 0.35" +
-         make_gnuplot_color_clause(plot_colors::blue) + "title 'fixes', $fitted using " + columns +
-         " with lines linewidth 2 dashtype 2" + make_gnuplot_color_clause(plot_colors::vermilion) +
+         make_color_clause(plot_colors::blue) + "title 'fixes', $fitted using " + columns +
+         " with lines linewidth 2 dashtype 2" + make_color_clause(plot_colors::vermilion) +
          "title 'fitted line'\n";
 }
 
@@ -271,7 +268,7 @@ constexpr std::array<const char*, 5> kPartColors{plot_colors::gray, plot_colors:
                                                  plot_colors::green, plot_colors::purple,
                                                  plot_colors::vermilion};
 
-double compute_total_variance(const std::vector<double>& values) {
+double sum_variances(const std::vector<double>& values) {
   return std::accumulate(values.begin(), values.end(), 0.0);
 }
 
@@ -279,13 +276,13 @@ double compute_total_variance(const std::vector<double>& values) {
 std::string format_columns(const BudgetPlot& plot) {
   auto fixes = plot.variances_m2;
   std::stable_sort(fixes.begin(), fixes.end(), [](const auto& a, const auto& b) {
-    return compute_total_variance(a) < compute_total_variance(b);
+    return sum_variances(a) < sum_variances(b);
   });
   const std::size_t columns = std::min(fixes.size(), kMaxColumns);
   std::string rows;
   for (std::size_t i = 1; i <= columns; ++i) {
     for (const double variance_m2 : fixes[fixes.size() * i / columns - 1]) {
-      rows.append(format_significant_digits(1e6 * variance_m2, kPlotDigits)).append(" ");
+      rows.append(format_digits(1e6 * variance_m2, kPlotDigits)).append(" ");
     }
     rows.append("\n");
   }
@@ -294,20 +291,20 @@ std::string format_columns(const BudgetPlot& plot) {
 
 }  // namespace
 
-double choose_error_magnification(double p90_m, double width_m) {
+double choose_error_scale(double p90_m, double width_m) {
   constexpr double largest_share = 0.1;
-  return p90_m > 0 ? std::max(1.0, round_down_to_1_2_5_series(largest_share * width_m / p90_m)) : 1;
+  return p90_m > 0 ? std::max(1.0, round_down_to_1_2_5(largest_share * width_m / p90_m)) : 1;
 }
 
-Drawing make_fix_error_plot_drawing(const ErrorPlot& plot) {
+Drawing draw_fix_errors(const ErrorPlot& plot) {
   Scale scale(plot);
   const std::size_t step = compute_thinning_step(plot.fixes.size(), kMaxArrows);
   const Blocks blocks(plot, step, scale);
   const double margin_m = 0.06 * scale.width_m;
   const Eigen::Vector2d lower = scale.extent.min() - Eigen::Vector2d(margin_m, 2 * margin_m),
                         upper = scale.extent.max() + Eigen::Vector2d(margin_m, margin_m);
-  std::string title = plot.title + "\nerrors drawn " +
-                      format_significant_digits(scale.magnification, 6) + " times as long";
+  std::string title =
+      plot.title + "\nerrors drawn " + format_digits(scale.magnification, 6) + " times as long";
   const std::string note = describe_thinning(plot.fixes.size(), step);
   if (!note.empty()) title += "; " + note + ", and the 20 largest";
   constexpr int width_px = 720, beside_px = 90, around_px = 180, smallest_px = 400,
@@ -316,16 +313,15 @@ Drawing make_fix_error_plot_drawing(const ErrorPlot& plot) {
   return {
       "errors", width_px,
       static_cast<int>(std::clamp<double>(plan_px + around_px, smallest_px, largest_px)),
-      blocks.text() + make_common_gnuplot_settings() + make_gnuplot_title_command(title) +
+      blocks.text() + make_settings() + make_gnuplot_title_command(title) +
           make_scale_bar(scale, {scale.extent.min().x(), scale.extent.min().y() - 1.2 * margin_m}) +
           "set xlabel 'x (m)'\nset ylabel 'y (m)'\nset size ratio -1\nset xrange " +
           format_gnuplot_range(lower.x(), upper.x()) + "\nset yrange " +
-          format_gnuplot_range(lower.y(), upper.y()) + "\n" +
-          format_plot_commands(plot, blocks, scale),
+          format_gnuplot_range(lower.y(), upper.y()) + "\n" + format_commands(plot, blocks, scale),
       make_error_table(plot)};
 }
 
-Drawing make_error_cdf_plot_drawing(const CdfPlot& plot) {
+Drawing draw_error_cdf(const CdfPlot& plot) {
   assert(!plot.curves.empty());
   constexpr double off_the_picture = 4, margin = 1.05;
   double largest_m = 0, largest_p90_m = 0;
@@ -339,13 +335,13 @@ Drawing make_error_cdf_plot_drawing(const CdfPlot& plot) {
 
   std::string blocks, layers;
   for (std::size_t i = 0; i < plot.curves.size(); ++i) {
-    blocks += format_cdf_data_blocks(plot.curves[i], std::to_string(i));
+    blocks += format_cdf_blocks(plot.curves[i], std::to_string(i));
     layers.append(layers.empty() ? "plot " : ", ").append(format_layer(plot.curves[i], i));
   }
   const std::string beyond =
-      cut ? "; the largest, " + format_length_in_mm(largest_m) + " mm, is outside the plot" : "";
+      cut ? "; the largest, " + format_mm(largest_m) + " mm, is outside the plot" : "";
   return {"cdf", 720, 460 + 24 * static_cast<int>(plot.curves.size()),
-          blocks + make_common_gnuplot_settings() + make_gnuplot_title_command(plot.title) +
+          blocks + make_settings() + make_gnuplot_title_command(plot.title) +
               "set xlabel 'horizontal error (mm)" + beyond +
               "'\n"
               "set ylabel 'fixes with at most this error (%)'\n"
@@ -355,7 +351,7 @@ Drawing make_error_cdf_plot_drawing(const CdfPlot& plot) {
               "\nset yrange [0:102]\nset ytics (0, 25, 50, 75, 90, 100)\n" + layers + "\n"};
 }
 
-Drawing make_line_drive_plot_drawing(const TrackPlot& plot) {
+Drawing draw_line_drive(const TrackPlot& plot) {
   assert(plot.commanded_m[0] != plot.commanded_m[1] && plot.fitted_m[0] != plot.fitted_m[1]);
   assert(!plot.fixes_m.empty());
   const std::size_t step = compute_thinning_step(plot.fixes_m.size(), kMaxFixes);
@@ -364,30 +360,26 @@ Drawing make_line_drive_plot_drawing(const TrackPlot& plot) {
   const double around_m = margin * floor.sizes().maxCoeff();
   const Eigen::Vector2d low = floor.min().array() - around_m, high = floor.max().array() + around_m;
   const Eigen::Vector2d sizes_m = high - low;
-  const std::string tics =
-      format_significant_digits(round_down_to_1_2_5_series(sizes_m.maxCoeff() / 4), 7);
+  const std::string tics = format_digits(round_down_to_1_2_5(sizes_m.maxCoeff() / 4), 7);
   constexpr double width_px = 620, around_px = 60, below_px = 430;
   constexpr double smallest_px = 60, largest_px = 420;
   const double plan_px = std::clamp(width_px * sizes_m.y() / sizes_m.x(), smallest_px, largest_px),
                height_px = around_px + plan_px + below_px;
-  const auto from_bottom = [&](double y_px) {
-    return format_significant_digits(y_px / height_px, 4);
-  };
+  const auto from_bottom = [&](double y_px) { return format_digits(y_px / height_px, 4); };
   const double aside_mm = 1e3 * (along.sizes().y() * 0.15 + 1e-6);
   const std::string note = describe_thinning(plot.fixes_m.size(), step);
   return {
       "track", 720, static_cast<int>(height_px),
-      make_gnuplot_data_block("commanded", commanded) + make_gnuplot_data_block("fixes", fixes) +
-          make_gnuplot_data_block("fitted", fitted) + make_common_gnuplot_settings() +
-          "set multiplot title " +
-          quote_text_for_gnuplot(note.empty() ? plot.title : plot.title + "\n" + note) +
+      make_data_block("commanded", commanded) + make_data_block("fixes", fixes) +
+          make_data_block("fitted", fitted) + make_settings() + "set multiplot title " +
+          quote_for_gnuplot(note.empty() ? plot.title : plot.title + "\n" + note) +
           " noenhanced\n"
           "set lmargin at screen 0.12\nset rmargin at screen 0.98\nset bmargin at screen " +
           from_bottom(below_px) + "\nset tmargin at screen " + from_bottom(below_px + plan_px) +
           "\nset size ratio -1\nset xtics " + tics + "\nset ytics " + tics +
           "\nset xlabel 'x (m)'\nset ylabel 'y (m)'\nunset key\nset xrange " +
           format_gnuplot_range(low.x(), high.x()) + "\nset yrange " +
-          format_gnuplot_range(low.y(), high.y()) + "\n" + format_plot_commands("1:2") +
+          format_gnuplot_range(low.y(), high.y()) + "\n" + format_commands("1:2") +
           "set bmargin at screen " + from_bottom(100) + "\nset tmargin at screen " +
           from_bottom(below_px - 85) +
           "\nset size noratio\nset xtics autofreq\nset ytics autofreq\nset key horizontal Left "
@@ -399,33 +391,33 @@ Drawing make_line_drive_plot_drawing(const TrackPlot& plot) {
           format_gnuplot_range(along.min().x() - around_m, along.max().x() + around_m) +
           "\nset yrange " +
           format_gnuplot_range(1e3 * along.min().y() - aside_mm, 1e3 * along.max().y() + aside_mm) +
-          "\n" + format_plot_commands("3:4") + "unset multiplot\n"};
+          "\n" + format_commands("3:4") + "unset multiplot\n"};
 }
 
-std::vector<double> BudgetPlot::compute_variance_contribution_fractions() const {
+std::vector<double> BudgetPlot::compute_fractions() const {
   std::vector<double> fractions(parts.size());
   double whole = 0;
   for (const auto& fix : variances_m2) {
     for (std::size_t i = 0; i < fix.size(); ++i) fractions[i] += fix[i];
-    whole += compute_total_variance(fix);
+    whole += sum_variances(fix);
   }
   for (double& fraction : fractions) fraction /= whole;
   return fractions;
 }
 
-Drawing make_variance_budget_plot_drawing(const BudgetPlot& plot) {
+Drawing draw_budget(const BudgetPlot& plot) {
   assert(!plot.variances_m2.empty() && plot.parts.size() <= kPartColors.size());
-  const std::vector<double> fractions = plot.compute_variance_contribution_fractions();
+  const std::vector<double> fractions = plot.compute_fractions();
   std::string layers;
   for (std::size_t i = 0; i < plot.parts.size(); ++i) {
     if (!(fractions[i] > 0)) continue;
     const std::string label = fmt::format("{}, {:.0f} %", plot.parts[i], 100 * fractions[i]);
     layers += fmt::format("{}$budget using {} linecolor rgb '{}' title {} noenhanced",
                           layers.empty() ? "plot " : ", ", i + 1, kPartColors[i],
-                          quote_text_for_gnuplot(label));
+                          quote_for_gnuplot(label));
   }
   return {"budget", 720, 520,
-          make_gnuplot_data_block("budget", format_columns(plot)) + make_common_gnuplot_settings() +
+          make_data_block("budget", format_columns(plot)) + make_settings() +
               make_gnuplot_title_command(plot.title) +
               "set xlabel 'fixes, the most certain first'\n"
               "set ylabel 'horizontal variance (mm²)'\n"

@@ -33,7 +33,7 @@ struct ErrorPlot {
 ///
 /// The factor is 1, 2 or 5 times a power of ten, at least 1. It makes the 90th percentile 1/25 to
 /// 1/10 of the width. 1 if there are no errors.
-double choose_error_magnification(double p90_m, double width_m);
+double choose_error_scale(double p90_m, double width_m);
 
 /// Plots an arrow from each true position towards its fix.
 ///
@@ -41,7 +41,7 @@ double choose_error_magnification(double p90_m, double width_m);
 /// plotted. Arrows longer than a quarter of the floor are cut short, dashed and counted. If there
 /// are more than 200 captures without a fix, a subset is plotted. The table lists the ten largest
 /// errors.
-Drawing make_fix_error_plot_drawing(const ErrorPlot& plot);
+Drawing draw_fix_errors(const ErrorPlot& plot);
 
 /// Cumulative distribution of errors.
 struct CdfPlot {
@@ -60,7 +60,7 @@ struct CdfPlot {
 /// Plots the distributions in millimeters. A curve of more than 500 errors passes through 500 of
 /// them, the largest included. Errors above four times the largest p90 are clipped, which the axis
 /// label mentions.
-Drawing make_error_cdf_plot_drawing(const CdfPlot& plot);
+Drawing draw_error_cdf(const CdfPlot& plot);
 
 /// Fixes of a camera on a drive along a commanded straight line, in the world: figure 10 of Chen
 /// and Guan.
@@ -77,7 +77,7 @@ struct TrackPlot {
 /// Plots the lines and fixes on the floor. A second plot shows the distances of fixes and fitted
 /// line to the left of the commanded line, in mm, along it. If there are more than 2,000 fixes, a
 /// regular subset in their order is plotted.
-Drawing make_line_drive_plot_drawing(const TrackPlot& plot);
+Drawing draw_line_drive(const TrackPlot& plot);
 
 /// Contributions to the uncertainty of fixes.
 struct BudgetPlot {
@@ -88,12 +88,12 @@ struct BudgetPlot {
   std::vector<std::vector<double>> variances_m2;
 
   /// Returns the fraction of each contribution in the sum over all fixes.
-  std::vector<double> compute_variance_contribution_fractions() const;
+  std::vector<double> compute_fractions() const;
 };
 
 /// Plots one column per fix with its contributions stacked, the smallest total first. If there are
 /// more than 200 fixes, 200 are plotted, the largest among them. Contributions that are zero for
 /// all fixes are omitted from the key.
-Drawing make_variance_budget_plot_drawing(const BudgetPlot& plot);
+Drawing draw_budget(const BudgetPlot& plot);
 
 }  // namespace vlp

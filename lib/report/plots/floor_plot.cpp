@@ -9,8 +9,7 @@
 
 namespace vlp {
 
-FloorPlot collect_floor_plot_data(const FloorLimits& limits, const std::string& title,
-                                  double step_m) {
+FloorPlot make_floor_plot(const FloorLimits& limits, const std::string& title, double step_m) {
   FloorPlot plot{title, "horizontal standard deviation (mm)", step_m, {}};
   for (const FloorLimits::Position& place : limits.positions) {
     plot.positions.push_back({place.camera.position_m.head<2>(), {}});
@@ -24,18 +23,15 @@ void write_floor_plot(const std::filesystem::path& file, const FloorPlot& plot,
                       const LampMap& lamps) {
   std::string places, on_floor;
   for (const auto& place : plot.positions) {
-    if (place.value)
-      places += format_gnuplot_data_row({place.xy_m.x(), place.xy_m.y(), *place.value});
+    if (place.value) places += format_data_row({place.xy_m.x(), place.xy_m.y(), *place.value});
   }
   for (const Lamp& lamp : lamps.lamps) {
-    on_floor +=
-        format_gnuplot_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
+    on_floor += format_data_row({lamp.position_m.x(), lamp.position_m.y(), double(lamp.id)});
   }
-  const std::string half = format_significant_digits(plot.step_m / 2, kPlotDigits);
+  const std::string half = format_digits(plot.step_m / 2, kPlotDigits);
   const std::string commands =
-      make_gnuplot_data_block("places", places) + make_gnuplot_data_block("lamps", on_floor) +
-      make_common_gnuplot_settings() + make_gnuplot_title_command(plot.title) + "set cblabel " +
-      quote_text_for_gnuplot(plot.label) +
+      make_data_block("places", places) + make_data_block("lamps", on_floor) + make_settings() +
+      make_gnuplot_title_command(plot.title) + "set cblabel " + quote_for_gnuplot(plot.label) +
       " noenhanced\n"
       "set xlabel 'x (m)'\n"
       "set ylabel 'y (m)'\n"

@@ -31,8 +31,7 @@ struct FloorPlot {
 
 /// Collects the horizontal standard deviation from all sources, in mm; blank where no fix is
 /// possible.
-FloorPlot collect_floor_plot_data(const FloorLimits& limits, const std::string& title,
-                                  double step_m);
+FloorPlot make_floor_plot(const FloorLimits& limits, const std::string& title, double step_m);
 
 /// Writes the plot as .png or .svg, by the extension of `file`.
 /// @throws InputError as write_plot()

@@ -22,7 +22,7 @@ std::string format_ordinal(std::size_t number) {
 
 }  // namespace
 
-double round_down_to_1_2_5_series(double value) {
+double round_down_to_1_2_5(double value) {
   const double power = std::pow(10, std::floor(std::log10(value) + 1e-9));
   for (const double digit : {5, 2}) {
     if (digit * power <= value * (1 + 1e-9)) return digit * power;
@@ -31,28 +31,24 @@ double round_down_to_1_2_5_series(double value) {
 }
 
 std::vector<double> list_1_2_5_series(double lowest, double highest) {
-  std::vector<double> numbers{round_down_to_1_2_5_series(lowest)};
+  std::vector<double> numbers{round_down_to_1_2_5(lowest)};
   while (numbers.back() < highest * (1 - 1e-9)) {
-    numbers.push_back(round_down_to_1_2_5_series(numbers.back() * 2.5));
+    numbers.push_back(round_down_to_1_2_5(numbers.back() * 2.5));
   }
-  if (numbers.size() == 1) numbers.push_back(round_down_to_1_2_5_series(numbers.back() * 2.5));
+  if (numbers.size() == 1) numbers.push_back(round_down_to_1_2_5(numbers.back() * 2.5));
   return numbers;
 }
 
 std::string format_number_for_humans(double value, int digits) {
   return std::abs(value) >= std::pow(10, digits) ? format_fixed_decimals(value, 0)
-                                                 : format_significant_digits(value, digits);
+                                                 : format_digits(value, digits);
 }
 
-std::string format_length_in_mm(double length_m) {
-  return format_number_for_humans(1e3 * length_m, 3);
-}
+std::string format_mm(double length_m) { return format_number_for_humans(1e3 * length_m, 3); }
 
-std::string format_length_with_mm_unit(double length_m) {
-  return format_significant_digits(1e3 * length_m, 3) + " mm";
-}
+std::string format_with_mm(double length_m) { return format_digits(1e3 * length_m, 3) + " mm"; }
 
-std::string quote_text_for_gnuplot(const std::string& text) {
+std::string quote_for_gnuplot(const std::string& text) {
   std::string quoted = "'";
   for (const char c : text) {
     if (c == '\'') {
@@ -66,18 +62,17 @@ std::string quote_text_for_gnuplot(const std::string& text) {
   return quoted + "'";
 }
 
-std::string format_gnuplot_data_row(std::initializer_list<double> values) {
+std::string format_data_row(std::initializer_list<double> values) {
   std::string row;
-  for (const double value : values)
-    row.append(format_significant_digits(value, kPlotDigits)).append(" ");
+  for (const double value : values) row.append(format_digits(value, kPlotDigits)).append(" ");
   return row + "\n";
 }
 
-std::string make_gnuplot_data_block(const std::string& name, const std::string& rows) {
+std::string make_data_block(const std::string& name, const std::string& rows) {
   return "$" + name + " << END\n" + rows + "END\n";
 }
 
-std::string make_common_gnuplot_settings() {
+std::string make_settings() {
   return "set encoding utf8\n"
          "set tics out nomirror\n"
          "set key below Left reverse height 1\n"
@@ -87,16 +82,15 @@ std::string make_common_gnuplot_settings() {
 }
 
 std::string make_gnuplot_title_command(const std::string& title) {
-  return "set title " + quote_text_for_gnuplot(title) + " noenhanced\n";
+  return "set title " + quote_for_gnuplot(title) + " noenhanced\n";
 }
 
-std::string make_gnuplot_color_clause(const std::string& color) {
+std::string make_color_clause(const std::string& color) {
   return " linecolor rgb '" + color + "' ";
 }
 
 std::string format_gnuplot_range(double from, double to) {
-  return "[" + format_significant_digits(from, kPlotDigits) + ":" +
-         format_significant_digits(to, kPlotDigits) + "]";
+  return "[" + format_digits(from, kPlotDigits) + ":" + format_digits(to, kPlotDigits) + "]";
 }
 
 std::size_t compute_thinning_step(std::size_t count, std::size_t max_count) {
@@ -109,8 +103,8 @@ std::string describe_thinning(std::size_t count, std::size_t step) {
   return "every " + format_ordinal(step) + " of " + std::to_string(count) + " drawn";
 }
 
-std::vector<std::size_t> select_every_nth_and_largest(std::span<const double> values,
-                                                      std::size_t step, std::size_t largest) {
+std::vector<std::size_t> thin_out(std::span<const double> values, std::size_t step,
+                                  std::size_t largest) {
   std::vector<std::size_t> all(values.size()), chosen;
   std::iota(all.begin(), all.end(), 0);
   for (std::size_t i = 0; i < values.size(); i += step) chosen.push_back(i);

@@ -13,7 +13,7 @@ namespace vlp {
 /// Returns the largest of ..., 0.1, 0.2, 0.5, 1, 2, 5, ... that does not exceed `value`, except for
 /// rounding.
 /// @pre value > 0
-double round_down_to_1_2_5_series(double value);
+double round_down_to_1_2_5(double value);
 
 /// Returns consecutive numbers of the series ..., 0.5, 1, 2, 5, 10, ..., ascending. The first is
 /// the largest one that does not exceed `lowest`. The last is the smallest one that is not below
@@ -25,11 +25,11 @@ std::vector<double> list_1_2_5_series(double lowest, double highest);
 /// that large numbers have no exponent.
 std::string format_number_for_humans(double value, int digits);
 
-/// Format a length in millimeters with three significant digits. format_length_in_mm() has no unit
-/// and keeps all integer digits, as format_number_for_humans(). format_length_with_mm_unit()
+/// Format a length in millimeters with three significant digits. format_mm() has no unit
+/// and keeps all integer digits, as format_number_for_humans(). format_with_mm()
 /// appends the unit and is for columns.
-std::string format_length_in_mm(double length_m);
-std::string format_length_with_mm_unit(double length_m);
+std::string format_mm(double length_m);
+std::string format_with_mm(double length_m);
 
 /// Color-blind safe palette of Okabe and Ito. Items that differ in color also differ in marker or
 /// dashes.
@@ -42,26 +42,26 @@ constexpr const char* gray = "#666666";
 }  // namespace plot_colors
 
 /// Returns `text` as a gnuplot string without interpretation of its content; line breaks are kept.
-std::string quote_text_for_gnuplot(const std::string& text);
+std::string quote_for_gnuplot(const std::string& text);
 
 /// Significant digits of the numbers in a plot.
 constexpr int kPlotDigits = 7;
 
 /// Returns a line of numbers.
-std::string format_gnuplot_data_row(std::initializer_list<double> values);
+std::string format_data_row(std::initializer_list<double> values);
 
 /// Returns rows as the data block `$name`.
-std::string make_gnuplot_data_block(const std::string& name, const std::string& rows);
+std::string make_data_block(const std::string& name, const std::string& rows);
 
 /// Returns the settings common to all plots: encoding, tics, grid, key below, label boxes, and the
 /// palette viridis. Viridis is even in lightness, and readable in gray and for the color-blind.
-std::string make_common_gnuplot_settings();
+std::string make_settings();
 
 /// Returns the command that sets the title, without interpretation of its content.
 std::string make_gnuplot_title_command(const std::string& title);
 
 /// Returns the clause of a color, with a space before and after.
-std::string make_gnuplot_color_clause(const std::string& color);
+std::string make_color_clause(const std::string& color);
 
 /// Returns the range `[from:to]`.
 std::string format_gnuplot_range(double from, double to);
@@ -75,7 +75,7 @@ std::size_t compute_thinning_step(std::size_t count, std::size_t max_count);
 std::string describe_thinning(std::size_t count, std::size_t step);
 
 /// Returns the ascending indices of every step-th value and of the `largest` largest values.
-std::vector<std::size_t> select_every_nth_and_largest(std::span<const double> values,
-                                                      std::size_t step, std::size_t largest);
+std::vector<std::size_t> thin_out(std::span<const double> values, std::size_t step,
+                                  std::size_t largest);
 
 }  // namespace vlp

@@ -35,7 +35,7 @@ std::string parse_date(const std::string& date) {
 std::string make_session_run_id(std::string utc, const std::string& text) {
   constexpr std::size_t digits = 16;
   std::erase_if(utc, [](char c) { return c == '-' || c == ':'; });
-  return utc + "-" + compute_text_sha256(text).substr(0, digits);
+  return utc + "-" + hash_text(text).substr(0, digits);
 }
 
 std::optional<double> find_number(const nlohmann::json& object, const char* key) {
@@ -66,20 +66,19 @@ void add_metrics(const nlohmann::json& entries, std::vector<CheckedMetric>& metr
 std::optional<SharedFolder> open_session(const fs::path& folder) {
   const fs::path camera = folder.parent_path(), kind = camera.parent_path();
   const SharedFolder results(kind.parent_path());
-  const auto kinds = results.open_subfolder_if_exists({kind.filename().string(), folder, "folder"});
+  const auto kinds = results.open_if_exists({kind.filename().string(), folder, "folder"});
   if (!kinds) return std::nullopt;
-  const auto cameras =
-      kinds->open_subfolder_if_exists({camera.filename().string(), folder, "camera"});
+  const auto cameras = kinds->open_if_exists({camera.filename().string(), folder, "camera"});
   if (!cameras) return std::nullopt;
-  return cameras->open_subfolder_if_exists({folder.filename().string(), folder, "session"});
+  return cameras->open_if_exists({folder.filename().string(), folder, "session"});
 }
 
 }  // namespace
 
-ReprocessedArchive read_reprocessed_archive_sessions(const fs::path& results) {
+ReprocessedArchive read_reprocessed(const fs::path& results) {
   const CsvTable summary(results / "summary.csv");
   const auto text = [&](std::size_t row, const char* column) {
-    return std::string(summary.get_cell_text(row, summary.get_required_column(column)));
+    return std::string(summary.get_cell_text(row, summary.require_column(column)));
   };
   const fs::path named = fs::absolute(results).lexically_normal();
   const fs::path last = named.has_filename() ? named.filename() : named.parent_path().filename();
@@ -119,15 +118,15 @@ ReprocessedArchive read_reprocessed_archive_sessions(const fs::path& results) {
   return archive;
 }
 
-RunRecord load_run_of_archive_session(const ReprocessedSession& session) {
+RunRecord load_archive_run(const ReprocessedSession& session) {
   RunRecord run = session.run;
   const fs::path file = session.folder / "session.json";
   const auto folder = open_session(session.folder);
   const auto text =
-      folder ? folder->read_file_if_exists("session.json", kMaxSessionFileBytes) : std::nullopt;
+      folder ? folder->read_if_exists("session.json", kMaxSessionFileBytes) : std::nullopt;
   if (!text) throw InputError(file, "cannot be opened: there is none");
   try {
-    check_json_size_and_depth(*text);
+    check_json_limits(*text);
     const auto document = nlohmann::json::parse(*text);
     for (const char* part : {"metrics", "gates"}) {
       if (document.contains(part)) add_metrics(document[part], run.metrics);
@@ -136,8 +135,7 @@ RunRecord load_run_of_archive_session(const ReprocessedSession& session) {
     // [STATION-14] `vlp-calibrate writes`
     throw InputError(file, fmt::format("is not as vlp-calibrate writes it: {}", error.what()));
   }
-  run.calibration =
-      folder->read_file_if_exists("calibration.yaml", kMaxSessionFileBytes).value_or("");
+  run.calibration = folder->read_if_exists("calibration.yaml", kMaxSessionFileBytes).value_or("");
   return run;
 }
 

@@ -13,7 +13,7 @@ namespace vlp {
 /// Session of an archive as a run, so that trends, capability and studies can use archives.
 struct ReprocessedSession {
   /// Record of the session as a run: ids, dates, program, verdict and causes. It has no metrics and
-  /// no calibration; load_run_of_archive_session() adds these.
+  /// no calibration; load_archive_run() adds these.
   RunRecord run;
   /// Folder of the files that vlp-calibrate wrote.
   std::filesystem::path folder;
@@ -37,10 +37,10 @@ struct ReprocessedArchive {
 ///   verdict        PASS for "pass" and "review", FAIL for "gate", INVALID without a result
 ///   config_sha256  key of the session: digest of its inputs, the toolbox and the options
 ///   run            date, and a digest of station, camera and session: the same each time
-ReprocessedArchive read_reprocessed_archive_sessions(const std::filesystem::path& results);
+ReprocessedArchive read_reprocessed(const std::filesystem::path& results);
 
 /// Loads the complete run of a session, with metrics and gates of its session.json. Throws
 /// InputError if vlp-calibrate did not write the file.
-RunRecord load_run_of_archive_session(const ReprocessedSession& session);
+RunRecord load_archive_run(const ReprocessedSession& session);
 
 }  // namespace vlp

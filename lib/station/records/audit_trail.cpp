@@ -20,13 +20,13 @@ namespace {
 std::string compute_digest(const std::vector<std::string>& texts) {
   std::string all;
   for (const std::string& text : texts) all += fmt::format("{} {}\n", text.size(), text);
-  return compute_text_sha256(all);
+  return hash_text(all);
 }
 
 /// Returns the SHA-256 of the document of a run; empty if its rows are not those of its document.
-std::string compute_digest_of_rows(const RunRows& rows) {
+std::string hash_rows(const RunRows& rows) {
   try {
-    return rows == make_run_rows(rows.document) ? compute_text_sha256(rows.document) : "";
+    return rows == make_run_rows(rows.document) ? hash_text(rows.document) : "";
   } catch (const std::runtime_error&) {  // a document that was edited
     return "";
   }
@@ -97,11 +97,10 @@ void check_chain(const std::vector<Entry>& entries, std::vector<std::string>& pr
 
 void lock_audit_trail(soci::session& sql) { sql << "UPDATE vlp_schema SET version = version"; }
 
-void append_run_events_to_audit_trail(soci::session& sql, const std::string& run,
-                                      const std::string& document,
-                                      const std::vector<RunEvent>& new_events) {
+void append_to_trail(soci::session& sql, const std::string& run, const std::string& document,
+                     const std::vector<RunEvent>& new_events) {
   std::vector<Entry> added;
-  if (!document.empty()) added.push_back({0, run, "", compute_text_sha256(document), ""});
+  if (!document.empty()) added.push_back({0, run, "", hash_text(document), ""});
   for (const RunEvent& event : new_events) {
     added.push_back({0, run, event.event, compute_digest(run, event), ""});
   }
@@ -149,7 +148,7 @@ TrailCheck check_audit_trail(soci::session& sql, const std::string& expected_dig
   };
   for (const std::string& name : load_run_ids(sql)) {
     ++check.runs;
-    check_item(name, "", compute_digest_of_rows(load_run_rows(sql, name)));
+    check_item(name, "", hash_rows(load_run_rows(sql, name)));
     for (const RunEvent& event : load_run_events(sql, name)) {
       check_item(name, event.event, compute_digest(name, event));
     }

@@ -33,9 +33,8 @@ namespace vlp {
 void lock_audit_trail(soci::session& sql);
 /// Locks the trail and appends the entries of new events of a run, after that of the run itself if
 /// it is new: `document` is then its document, otherwise empty.
-void append_run_events_to_audit_trail(soci::session& sql, const std::string& run,
-                                      const std::string& document,
-                                      const std::vector<RunEvent>& new_events);
+void append_to_trail(soci::session& sql, const std::string& run, const std::string& document,
+                     const std::vector<RunEvent>& new_events);
 
 /// Result of check_audit_trail(): numbers of runs and entries, and differences.
 struct TrailCheck {

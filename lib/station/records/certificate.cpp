@@ -42,9 +42,8 @@ std::string append_unit(const std::string& text, const std::string& unit) {
 
 std::string make_verdict_section(const RunRecord& record) {
   const bool conforms = record.has_run_passed();
-  const std::string words =
-      conforms ? "The unit conforms with all requirements below."
-               : "The unit does not conform: " + record.first_verdict_cause() + ".";
+  const std::string words = conforms ? "The unit conforms with all requirements below."
+                                     : "The unit does not conform: " + record.first_cause() + ".";
   return std::string("<div class=\"verdict ") + (conforms ? "pass" : "fail") + "\"><strong>" +
          escape_html_text(record.verdict) + "</strong>" + make_html_element("p", words) +
          "</div>\n";
@@ -73,7 +72,7 @@ std::string make_subject_section(const RunRecord& record, const Calibration& cal
 
 /// Describes the inputs that the uncertainty includes, and those that are assumed exact.
 std::string describe_inputs(const RunRecord& record, const Calibration& calibration) {
-  const CheckedMetric* print = record.find_metric_by_name("board_print_px");
+  const CheckedMetric* print = record.find_metric("board_print_px");
   const auto& report = calibration.intrinsics_report;
   if (print == nullptr || !print->value || !report || !report->covariance) {
     return "The board and the known points are assumed to be exact.";
@@ -87,8 +86,8 @@ std::string describe_inputs(const RunRecord& record, const Calibration& calibrat
 
 std::string make_results_section(const RunRecord& record, const Calibration& calibration) {
   HtmlTable table{"", {"quantity", "value and expanded uncertainty"}, {}};
-  for (const CertifiedValue& value : collect_certified_values(calibration)) {
-    table.rows.push_back({value.name, format_certified_value(value)});
+  for (const CertifiedValue& value : list_certified_values(calibration)) {
+    table.rows.push_back({value.name, format_value_with_expanded_uncertainty(value)});
   }
   const std::string lens(lens_model_name(calibration.camera.lens_model));
   return make_html_table(table) +
@@ -114,16 +113,16 @@ std::string make_conformity_table(const RunRecord& record) {
   constexpr int digits = 4, probability_digits = 3;
   for (const CheckedMetric& metric : record.metrics) {
     if (!metric.limit) continue;
-    std::string measured = metric.value ? format_significant_digits(*metric.value, digits) : "none";
+    std::string measured = metric.value ? format_digits(*metric.value, digits) : "none";
     std::string rule = "simple", outcome = metric.has_passed_gate() ? "yes" : "no";
     if (const auto& guard = metric.guard_band) {
       if (metric.value) {
-        measured = format_certified_value(
+        measured = format_value_with_expanded_uncertainty(
             CertifiedValue{"", metric.unit, *metric.value, guard->standard_uncertainty});
       }
       rule = fmt::format("guard band of {:.4g} u", guard->k);
       if (const auto sure = metric.conformance_probability()) {
-        outcome += ", p = " + format_significant_digits(*sure, probability_digits);
+        outcome += ", p = " + format_digits(*sure, probability_digits);
       }
     } else if (metric.value) {
       measured = append_unit(measured, metric.unit);
@@ -131,10 +130,10 @@ std::string make_conformity_table(const RunRecord& record) {
     if (!metric.has_passed_gate()) table.highlighted_rows.push_back(table.rows.size());
     table.rows.push_back(
         {describe_requirement(metric.name), measured,
-         describe_limit_direction(metric.direction) + " " +
-             append_unit(format_significant_digits(*metric.limit, digits), metric.unit),
-         append_unit(format_significant_digits(metric.acceptance_limit(), digits), metric.unit),
-         outcome, rule});
+         describe_direction(metric.direction) + " " +
+             append_unit(format_digits(*metric.limit, digits), metric.unit),
+         append_unit(format_digits(metric.acceptance_limit(), digits), metric.unit), outcome,
+         rule});
   }
   return make_html_table(table) +
          make_html_element(
@@ -152,7 +151,7 @@ std::string digest_images(const RunRecord& record, const std::string& step) {
     if (image.step == step && image.rejection.empty())
       text += image.name + " " + image.sha256 + "\n";
   }
-  return text.empty() ? "" : compute_text_sha256(text);
+  return text.empty() ? "" : hash_text(text);
 }
 
 std::string make_traceability_section(const RunRecord& record, const Calibration& calibration) {
@@ -167,7 +166,7 @@ std::string make_traceability_section(const RunRecord& record, const Calibration
                                 : " \"check\", the list of names and digests of the "
                                   "images at the known points: " +
                                       check + ".")) +
-         make_calibration_history_html_list(calibration.history);
+         make_history_list(calibration.history);
 }
 
 /// Makes the part with the data that a record does not contain.
@@ -183,7 +182,7 @@ std::string make_section_of_missing_data() {
 
 }  // namespace
 
-std::vector<CertifiedValue> collect_certified_values(const Calibration& calibration) {
+std::vector<CertifiedValue> list_certified_values(const Calibration& calibration) {
   constexpr double millimeters = 1e3, degrees = 180 / std::numbers::pi;
   const std::vector<double>& k = calibration.camera.intrinsics;
   const auto& lens = calibration.intrinsics_report;
@@ -193,9 +192,9 @@ std::vector<CertifiedValue> collect_certified_values(const Calibration& calibrat
   add_x_and_y_values(values, "principal point", "px", {k[2], k[3]}, lens_covariance, 1, 2);
   if (const auto& center = calibration.rotation_center) {
     add_x_and_y_values(values, "rotation center, undistorted image", "px", center->center_px,
-                       compute_rotation_center_covariance(calibration));
+                       compute_center_covariance(calibration));
     add_x_and_y_values(values, "zenith from the optical axis, 180/pi times its normalized point",
-                       "deg", compute_normalized_zenith_point(*center),
+                       "deg", compute_zenith_point(*center),
                        find_parameter_covariance(calibration, kZenithParameter), degrees);
     if (center->lever_arm_m) {
       add_x_and_y_values(values, "lever arm", "mm", *center->lever_arm_m,
@@ -204,15 +203,15 @@ std::vector<CertifiedValue> collect_certified_values(const Calibration& calibrat
   }
   if (const auto& dispersion = calibration.dispersion) {
     add_x_and_y_values(values, "dispersion offset", "px", dispersion->offset_px,
-                       compute_dispersion_offset_covariance(calibration));
+                       compute_offset_covariance(calibration));
   }
   return values;
 }
 
-std::string format_certified_value(const CertifiedValue& value) {
+std::string format_value_with_expanded_uncertainty(const CertifiedValue& value) {
   const double expanded = kCoverage * value.standard_uncertainty.value_or(0);
   if (!(expanded > 0) || !std::isfinite(expanded)) {
-    return append_unit(format_significant_digits(value.value, kSixDigits), value.unit) +
+    return append_unit(format_digits(value.value, kSixDigits), value.unit) +
            ", uncertainty not stated";
   }
   constexpr double ten = 10, two_digits = 100;
@@ -226,20 +225,19 @@ std::string format_certified_value(const CertifiedValue& value) {
                      value.unit);
 }
 
-void check_run_is_certifiable(const RunRecord& record) {
+void check_certifiable(const RunRecord& record) {
   const auto none = [&](const std::string& why) {
     return InputError(record.run, why + ": it has no certificate");
   };
   if (record.kind != "unit") throw none("is a run of the golden unit, which measures the station");
-  const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
+  const std::string no_verdict = explain_void_verdict(record);
   if (!no_verdict.empty()) throw none(no_verdict);
-  if (record.is_verdict_invalid())
-    throw none("was not judged (" + record.first_verdict_cause() + ")");
+  if (record.is_verdict_invalid()) throw none("was not judged (" + record.first_cause() + ")");
   if (record.calibration.empty()) throw none("has no calibration");
 }
 
-std::string make_calibration_certificate(const RunRecord& record, const Calibration& calibration) {
-  check_run_is_certifiable(record);
+std::string make_certificate(const RunRecord& record, const Calibration& calibration) {
+  check_certifiable(record);
   return make_html_page(
       "Calibration certificate: camera " + record.camera,
       make_verdict_section(record) +
@@ -250,15 +248,14 @@ std::string make_calibration_certificate(const RunRecord& record, const Calibrat
           make_html_section("To be completed by the issuer", make_section_of_missing_data()));
 }
 
-std::filesystem::path write_calibration_certificate(const RunRecord& record,
-                                                    const std::filesystem::path& results) {
-  check_run_is_certifiable(record);
+std::filesystem::path write_certificate(const RunRecord& record,
+                                        const std::filesystem::path& results) {
+  check_certifiable(record);
   const std::filesystem::path calibration =
       publish_run_files(record, {}, results) / calibration_file_name(record);
-  const SharedFolder folder = open_run_results_folder(record, results);
+  const SharedFolder folder = open_run_results(record, results);
   constexpr const char* name = "certificate.html";
-  folder.replace_file_atomically(
-      name, make_calibration_certificate(record, read_calibration(calibration)));
+  folder.replace_file(name, make_certificate(record, read_calibration(calibration)));
   return folder.folder_path() / name;
 }
 

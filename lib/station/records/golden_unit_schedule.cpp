@@ -30,7 +30,7 @@ constexpr std::size_t kMaxBytes = 1 << 24;
 
 std::string make_note_name(const StationConfig& config) {
   constexpr std::size_t digits = 16;
-  return ".golden-" + compute_text_sha256(config.station).substr(0, digits);
+  return ".golden-" + hash_text(config.station).substr(0, digits);
 }
 
 /// Returns the message about an incomplete note.
@@ -125,11 +125,11 @@ void add_gates(const std::vector<Gate>& gates, Lines& lines) {
 
 }  // namespace
 
-std::string hash_measurement_settings(const StationConfig& config) {
+std::string hash_settings(const StationConfig& config) {
   Lines lines;
   Calibration type;
   type.camera = config.nominal_camera;
-  lines.add("camera_type", format_calibration_yaml(type));
+  lines.add("camera_type", format_calibration(type));
   add_board(config.board, lines);
   add_lamps(config.lamps, lines);
   if (const auto& place_m = config.dispersion_position_m) {
@@ -152,13 +152,13 @@ std::string hash_measurement_settings(const StationConfig& config) {
   add_gates(config.gates, lines);
   if (const auto& golden = config.golden_unit) {
     lines.add("golden", golden->camera_id);
-    lines.add("calibration", format_calibration_yaml(golden->calibration));
+    lines.add("calibration", format_calibration(golden->calibration));
     add_gates(golden->gates, lines);
   }
-  return compute_text_sha256(lines.text());
+  return hash_text(lines.text());
 }
 
-std::string describe_golden_unit_problem(const StationConfig& config, GoldenCheckTime at) {
+std::string describe_golden_problem(const StationConfig& config, GoldenCheckTime at) {
   constexpr const char* verify = "'vlp-station verify' is due";
   if (!config.verification_interval) return "";
   const fs::path file = config.spool / make_note_name(config);
@@ -170,9 +170,8 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   }
   std::string text;
   try {
-    text = SharedFolder(config.spool)
-               .read_file_if_exists(make_note_name(config), kMaxBytes)
-               .value_or("");
+    text =
+        SharedFolder(config.spool).read_if_exists(make_note_name(config), kMaxBytes).value_or("");
   } catch (const InputError& error) {
     return describe_damaged_note(error.what());
   }
@@ -188,7 +187,7 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   if (failed) {
     return fmt::format("the golden unit failed (run {}): repair the station, then {}", run, verify);
   }
-  if (measured_with != hash_measurement_settings(config)) {
+  if (measured_with != hash_settings(config)) {
     return fmt::format(
         "station.yaml or a file that it names was changed in a way that affects measurements after "
         "the golden unit was measured (run {}): {}",
@@ -196,7 +195,7 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   }
   if (at == GoldenCheckTime::verdict) return "";
   constexpr double second_per_hour = 3600;
-  const double age_h = compute_age_of_utc_s(ended_utc) / second_per_hour;
+  const double age_h = compute_utc_age_s(ended_utc) / second_per_hour;
   const auto& due = *config.verification_interval;
   if (due.hours && !(age_h >= 0 && age_h <= *due.hours)) {
     // [STATION-3] `golden unit was measured`
@@ -211,16 +210,15 @@ std::string describe_golden_unit_problem(const StationConfig& config, GoldenChec
   return "";
 }
 
-void record_run_in_golden_unit_note(const StationConfig& config, const RunRecord& record) {
+void record_golden_run(const StationConfig& config, const RunRecord& record) {
   if (!config.verification_interval || record.is_verdict_invalid()) return;
   create_station_folder(config.spool);
   const SharedFolder spool(config.spool);
   const std::string note = make_note_name(config);
   try {
     if (record.kind == "golden") {
-      spool.replace_file_atomically(
-          note, fmt::format("{} {} {} {}\n", record.run, record.verdict, record.ended_utc,
-                            hash_measurement_settings(config)));
+      spool.replace_file(note, fmt::format("{} {} {} {}\n", record.run, record.verdict,
+                                           record.ended_utc, hash_settings(config)));
     } else {
       append_line_to_note(spool, note, kUnitLine);  // never measured: nothing to count from
     }
@@ -230,12 +228,11 @@ void record_run_in_golden_unit_note(const StationConfig& config, const RunRecord
   }
 }
 
-bool delete_golden_unit_note_of_run(const StationConfig& config, const std::string& run) {
+bool delete_golden_note(const StationConfig& config, const std::string& run) {
   try {
-    const auto note =
-        SharedFolder(config.spool).read_file_if_exists(make_note_name(config), kMaxBytes);
+    const auto note = SharedFolder(config.spool).read_if_exists(make_note_name(config), kMaxBytes);
     if (!note || note->substr(0, note->find(' ')) != run) return false;
-  } catch (const InputError&) {  // no spool, or no valid note (describe_golden_unit_problem())
+  } catch (const InputError&) {  // no spool, or no valid note (describe_golden_problem())
     return false;
   }
   delete_note(config);

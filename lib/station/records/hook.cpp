@@ -56,7 +56,7 @@ class Descriptor {
 };
 
 /// Returns the child processes of this process; empty if /proc is not readable.
-std::vector<pid_t> find_children() {
+std::vector<pid_t> list_children() {
   std::vector<pid_t> found;
   std::error_code none;
   for (const auto& entry : std::filesystem::directory_iterator("/proc", none)) {
@@ -77,17 +77,17 @@ std::vector<pid_t> find_children() {
 /// therefore cannot evade the time limit by an own group or session.
 class Subreaper {
  public:
-  Subreaper() : before_(find_children()) { ::prctl(PR_SET_CHILD_SUBREAPER, 1); }
+  Subreaper() : before_(list_children()) { ::prctl(PR_SET_CHILD_SUBREAPER, 1); }
   ~Subreaper() { ::prctl(PR_SET_CHILD_SUBREAPER, 0); }
   Subreaper(const Subreaper&) = delete;
   Subreaper& operator=(const Subreaper&) = delete;
 
   /// Kills the new children, and the orphans that they leave.
-  void kill_process_and_children() const {
+  void kill_process_tree() const {
     constexpr int tries = 100;
     for (int i = 0; i < tries; ++i) {
       bool any = false;
-      for (const pid_t child : find_children()) {
+      for (const pid_t child : list_children()) {
         if (std::find(before_.begin(), before_.end(), child) != before_.end()) continue;
         any = true;
         ::kill(child, SIGKILL);
@@ -200,20 +200,18 @@ int start_process(const Hook& hook, int input, int output, int lock, pid_t& id) 
 }
 
 /// Returns the last non-empty line, shortened.
-std::string find_last_line(std::string text) {
+std::string get_last_line(std::string text) {
   constexpr std::size_t max_bytes = 200;
   while (!text.empty() && std::isspace(static_cast<unsigned char>(text.back())) != 0) {
     text.pop_back();
   }
   text.erase(0, text.rfind('\n') + 1);  // npos + 1 is 0
-  text = escape_text_for_terminal(text);
+  text = escape_for_terminal(text);
   std::replace(text.begin(), text.end(), '\t', ' ');
-  return escape_text_for_terminal(text.substr(0, max_bytes));
+  return escape_for_terminal(text.substr(0, max_bytes));
 }
 
-RunEvent make_hook_failed_event(const std::string& why) {
-  return make_run_event_now(kHookFailed, why);
-}
+RunEvent make_failed_event(const std::string& why) { return make_run_event_now(kHookFailed, why); }
 
 /// Returns true if the open file is still the one of this name.
 bool is_same_file(int descriptor, const std::filesystem::path& file) {
@@ -225,17 +223,17 @@ bool is_same_file(int descriptor, const std::filesystem::path& file) {
 
 }  // namespace
 
-RunEvent make_hook_requested_event(const Hook& hook, const std::string& operator_name) {
-  return make_run_event_now(
-      kHookRequested, escape_text_for_single_line(fmt::format("{}", fmt::join(hook.command, " "))),
-      operator_name);
+RunEvent make_requested_event(const Hook& hook, const std::string& operator_name) {
+  return make_run_event_now(kHookRequested,
+                            escape_for_line(fmt::format("{}", fmt::join(hook.command, " "))),
+                            operator_name);
 }
 
 RunEvent run_station_hook(const Hook& hook, const RunRecord& record, const HookLock& lock) {
   std::array<int, 2> pipe{};
   const Descriptor input(make_memory_file(format_hook_json(record)));
   if (input.get() < 0 || ::pipe2(pipe.data(), O_CLOEXEC) != 0) {
-    return make_hook_failed_event("cannot be started: " + std::generic_category().message(errno));
+    return make_failed_event("cannot be started: " + std::generic_category().message(errno));
   }
   const Descriptor from(pipe[0]);
   Descriptor to(pipe[1]);
@@ -243,21 +241,20 @@ RunEvent run_station_hook(const Hook& hook, const RunRecord& record, const HookL
   Process process{0, from.get()};
   std::signal(SIGCHLD, SIG_DFL);  // if SIGCHLD is ignored, no status is available
   const Subreaper subreaper;
-  if (const int error =
-          start_process(hook, input.get(), to.get(), lock.descriptor_of_lock_file(), process.id);
+  if (const int error = start_process(hook, input.get(), to.get(), lock.descriptor(), process.id);
       error != 0) {
-    return make_hook_failed_event(hook.command.front() +
-                                  " cannot be started: " + std::generic_category().message(error));
+    return make_failed_event(hook.command.front() +
+                             " cannot be started: " + std::generic_category().message(error));
   }
   to.close();
   std::optional<int> status;
   try {
     status = process.wait_for_process(hook.time_limit_s);
   } catch (const std::system_error& error) {
-    return make_hook_failed_event("its exit code is unknown: " + error.code().message());
+    return make_failed_event("its exit code is unknown: " + error.code().message());
   }
-  if (!status) subreaper.kill_process_and_children();
-  const std::string line = find_last_line(process.written);
+  if (!status) subreaper.kill_process_tree();
+  const std::string line = get_last_line(process.written);
   if (status && WIFEXITED(*status) && WEXITSTATUS(*status) == 0)
     return make_run_event_now(kHookDone, line);
   std::string why;
@@ -269,26 +266,24 @@ RunEvent run_station_hook(const Hook& hook, const RunRecord& record, const HookL
   } else {
     why = fmt::format("ended by signal {}", WTERMSIG(*status));
   }
-  return make_hook_failed_event(line.empty() ? why : why.append(": ").append(line));
+  return make_failed_event(line.empty() ? why : why.append(": ").append(line));
 }
 
 bool is_hook_pending(const RunRecord& record) {
-  return find_index_of_last_event_of_kind(record, kHookRequested) >
-         find_index_of_last_event_of_kind(record, kHookDone);
+  return get_last_event_index(record, kHookRequested) > get_last_event_index(record, kHookDone);
 }
 
 std::string describe_pending_hook(const RunRecord& record) {
   if (!is_hook_pending(record)) return "";
-  const std::ptrdiff_t failed = find_index_of_last_event_of_kind(record, kHookFailed);
+  const std::ptrdiff_t failed = get_last_event_index(record, kHookFailed);
   // [STATION-9] `not run to its end` | station ended, error, or `time_limit_s` exceeded |
   //   `vlp-station show RUN`, then `vlp-station hook`
-  if (failed < find_index_of_last_event_of_kind(record, kHookRequested))
-    return "was not run to its end";
+  if (failed < get_last_event_index(record, kHookRequested)) return "was not run to its end";
   return "failed: " + record.events[static_cast<std::size_t>(failed)].text;
 }
 
-std::string run_hook_and_record_result(const Hook& hook, RunRecord& record, const HookLock& lock,
-                                       Spool& spool) {
+std::string run_and_record_hook(const Hook& hook, RunRecord& record, const HookLock& lock,
+                                Spool& spool) {
   std::string problem;
   record.events.push_back(run_station_hook(hook, record, lock));
   try {
@@ -297,7 +292,7 @@ std::string run_hook_and_record_result(const Hook& hook, RunRecord& record, cons
     // [STATION-9] `hook is not recorded`
     problem = std::string("the result of the hook is not recorded: ") + error.what();
   }
-  spool.deliver_waiting_runs();
+  spool.deliver_waiting();
   return problem;
 }
 

@@ -13,7 +13,7 @@ namespace vlp {
 
 /// Makes the event that a hook is to run, which is recorded together with the run. It identifies
 /// hooks that did not finish.
-RunEvent make_hook_requested_event(const Hook& hook, const std::string& operator_name);
+RunEvent make_requested_event(const Hook& hook, const std::string& operator_name);
 
 /// Returns true if a hook of the run still has to run: it was requested at the verdict or at the
 /// voiding, and has not succeeded since. Decided from the events of the record.
@@ -31,10 +31,10 @@ class HookLock {
   HookLock& operator=(const HookLock&) = delete;
 
   /// Returns true unless another program is running the hook.
-  bool has_acquired_hook_lock() const { return held_; }
+  bool is_holding() const { return held_; }
   /// Returns the file descriptor of the lock; negative if there is no lock file. A process that has
   /// the descriptor holds the lock.
-  int descriptor_of_lock_file() const { return descriptor_; }
+  int descriptor() const { return descriptor_; }
 
  private:
   std::filesystem::path file_;
@@ -56,7 +56,7 @@ RunEvent run_station_hook(const Hook& hook, const RunRecord& record, const HookL
 
 /// Runs the hook of a stored run and records the result as another event of the run. Returns the
 /// reason why the event is not recorded; empty if it is. The verdict is valid without the event.
-std::string run_hook_and_record_result(const Hook& hook, RunRecord& record, const HookLock& lock,
-                                       Spool& spool);
+std::string run_and_record_hook(const Hook& hook, RunRecord& record, const HookLock& lock,
+                                Spool& spool);
 
 }  // namespace vlp

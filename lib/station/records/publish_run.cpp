@@ -32,7 +32,7 @@ Id make_run_folder_id(const RunRecord& record) {
 bool has_file_content(const SharedFolder& folder, const std::string& name,
                       const std::string& content) {
   try {
-    return folder.read_file_if_exists(name, content.size()) == content;
+    return folder.read_if_exists(name, content.size()) == content;
   } catch (const InputError&) {
     return false;
   }
@@ -42,8 +42,8 @@ bool has_file_content(const SharedFolder& folder, const std::string& name,
 fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) {
   const char* name = calibration_file_name(record);
   fs::path file = folder.folder_path() / name;
-  if (!folder.contains_folder_entry(name)) {
-    folder.replace_file_atomically(name, record.calibration);
+  if (!folder.contains(name)) {
+    folder.replace_file(name, record.calibration);
   } else if (!has_file_content(folder, name, record.calibration)) {
     throw InputError(file, "differs from the record: move it away");
   }
@@ -51,7 +51,7 @@ fs::path write_calibration(const RunRecord& record, const SharedFolder& folder) 
 }
 
 ReportVerdict make_report_verdict(const RunRecord& record) {
-  const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
+  const std::string no_verdict = explain_void_verdict(record);
   ReportVerdict verdict{record.verdict,
                         record.has_run_passed()       ? Verdict::pass
                         : record.is_verdict_invalid() ? Verdict::invalid
@@ -70,11 +70,10 @@ std::string describe_meaning(const CheckedMetric& metric) {
 
 }  // namespace
 
-void check_results_folder_writable(const fs::path& results, const std::string& camera) {
+void check_results_writable(const fs::path& results, const std::string& camera) {
   constexpr std::uintmax_t room_bytes = 8'000'000;
   create_station_folder(results);
-  require_writable_folder_with_space(
-      SharedFolder(results).open_or_create_subfolder({camera, results, "camera"}), room_bytes);
+  require_space(SharedFolder(results).open_or_create({camera, results, "camera"}), room_bytes);
 }
 
 const char* calibration_file_name(const RunRecord& record) {
@@ -83,7 +82,7 @@ const char* calibration_file_name(const RunRecord& record) {
   return record.is_verdict_invalid() ? "invalid-calibration.yaml" : "failed-calibration.yaml";
 }
 
-bool rename_files_of_voided_run(const RunRecord& record, const fs::path& results) {
+bool rename_voided_files(const RunRecord& record, const fs::path& results) {
   constexpr std::array names{std::pair("calibration.yaml", "voided-calibration.yaml"),
                              std::pair("failed-calibration.yaml", "voided-calibration.yaml"),
                              std::pair("invalid-calibration.yaml", "voided-calibration.yaml"),
@@ -92,9 +91,8 @@ bool rename_files_of_voided_run(const RunRecord& record, const fs::path& results
                              std::pair("replaced-report.html", "voided-replaced-report.html")};
   std::error_code missing;
   if (!fs::is_directory(results, missing)) return false;
-  const auto camera = SharedFolder(results).open_subfolder_if_exists(make_camera_folder_id(record));
-  const auto folder =
-      camera ? camera->open_subfolder_if_exists(make_run_folder_id(record)) : std::nullopt;
+  const auto camera = SharedFolder(results).open_if_exists(make_camera_folder_id(record));
+  const auto folder = camera ? camera->open_if_exists(make_run_folder_id(record)) : std::nullopt;
   if (!folder) return false;
   bool is_any_renamed = false;
   for (const auto& [name, voided_name] : names) {
@@ -103,14 +101,14 @@ bool rename_files_of_voided_run(const RunRecord& record, const fs::path& results
   return is_any_renamed;
 }
 
-SharedFolder open_run_results_folder(const RunRecord& record, const fs::path& results) {
+SharedFolder open_run_results(const RunRecord& record, const fs::path& results) {
   const Id camera = make_camera_folder_id(record), run = make_run_folder_id(record);
   create_station_folder(results);
-  return SharedFolder(results).open_or_create_subfolder(camera).open_or_create_subfolder(run);
+  return SharedFolder(results).open_or_create(camera).open_or_create(run);
 }
 
-std::string make_run_report_html(const RunRecord& record, const std::filesystem::path& calibration,
-                                 const std::vector<ReportPlot>& pictures) {
+std::string make_run_report(const RunRecord& record, const std::filesystem::path& calibration,
+                            const std::vector<ReportPlot>& pictures) {
   Report report;
   report.title = "Camera " + record.camera + " on " + record.station;
   report.verdict = make_report_verdict(record);
@@ -121,8 +119,7 @@ std::string make_run_report_html(const RunRecord& record, const std::filesystem:
       report.gates.push_back(metric);
       report.gates.back().name = name;
     } else if (metric.value) {
-      report.metrics.push_back(
-          {name, format_significant_digits(*metric.value, digits), metric.unit, ""});
+      report.metrics.push_back({name, format_digits(*metric.value, digits), metric.unit, ""});
     }
   }
   for (const auto& [step, image, sha256, refused] : record.images) {
@@ -146,18 +143,18 @@ std::string make_run_report_html(const RunRecord& record, const std::filesystem:
 
 fs::path publish_run_files(const RunRecord& record, const std::vector<ReportPlot>& pictures,
                            const fs::path& results, ExistingReport existing) {
-  const SharedFolder folder = open_run_results_folder(record, results);
+  const SharedFolder folder = open_run_results(record, results);
   fs::path calibration;
   if (!record.calibration.empty()) calibration = write_calibration(record, folder);
   const std::string name = find_voiding_event(record) ? "voided-report.html" : "report.html";
-  const bool is_there = folder.contains_folder_entry(name);
+  const bool is_there = folder.contains(name);
   if (is_there && existing == ExistingReport::keep) return folder.folder_path();
-  const std::string report = make_run_report_html(record, calibration, pictures);
+  const std::string report = make_run_report(record, calibration, pictures);
   if (is_there && has_file_content(folder, name, report)) return folder.folder_path();
   // The first one is kept: those that a restoring has drawn can be drawn again.
   const std::string replaced = "replaced-" + name;
-  if (is_there && !folder.contains_folder_entry(replaced)) folder.rename_file(name, replaced);
-  folder.replace_file_atomically(name, report);
+  if (is_there && !folder.contains(replaced)) folder.rename_file(name, replaced);
+  folder.replace_file(name, report);
   return folder.folder_path();
 }
 

@@ -11,7 +11,7 @@ namespace {
 /// Returns the names of the columns of table `runs`, except its document.
 std::string list_column_names(const char* separator) {
   std::string names;
-  for (const RunField& field : list_run_text_fields()) {
+  for (const RunField& field : list_run_fields()) {
     if (field.is_column) names.append(names.empty() ? "" : separator).append(field.name);
   }
   return names;
@@ -84,7 +84,7 @@ void create_record_tables(soci::session& sql) {
 RunRows make_run_rows(std::string document) {
   const RunRecord run = parse_run_document(document);
   RunRows rows{std::move(document), {}, {}, {}};
-  for (const RunField& field : list_run_text_fields()) {
+  for (const RunField& field : list_run_fields()) {
     if (field.is_column) rows.columns.push_back(run.*field.text);
   }
   for (const CheckedMetric& metric : run.metrics) {
@@ -98,8 +98,8 @@ RunRows make_run_rows(std::string document) {
 
 RunRows load_run_rows(soci::session& sql, const std::string& run) {
   RunRows rows;
-  rows.columns.resize(static_cast<std::size_t>(
-      std::ranges::count_if(list_run_text_fields(), &RunField::is_column)));
+  rows.columns.resize(
+      static_cast<std::size_t>(std::ranges::count_if(list_run_fields(), &RunField::is_column)));
   soci::statement columns(sql);
   for (std::string& column : rows.columns) columns.exchange(soci::into(column));
   columns.exchange(soci::into(rows.document));

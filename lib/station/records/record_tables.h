@@ -35,7 +35,7 @@ void create_record_tables(soci::session& sql);
 struct RunRows {
   /// serialize_run().
   std::string document;
-  /// Row of table `runs`: list_run_text_fields() with RunField::is_column.
+  /// Row of table `runs`: list_run_fields() with RunField::is_column.
   std::vector<std::string> columns;
   /// Rows of table `metrics`: value and gate, if any, by name.
   std::map<std::string, std::pair<std::optional<double>, std::optional<double>>> metrics;

@@ -53,20 +53,20 @@ void configure_connection(soci::session& sql, int timeout_s) {
 }
 
 void open_database_session(soci::session& sql, const std::string& where) {
-  if (is_database_server_address(where)) {
-    sql.open(soci::postgresql, make_soci_connection_string_from_address(where));
+  if (is_server_address(where)) {
+    sql.open(soci::postgresql, make_soci_string(where));
   } else {
     if (where.find('"') != std::string::npos) {
       throw InputError(where, "the name of a database cannot have a quote (\"): rename its folder");
     }
     sql.open(soci::sqlite3,
-             "dbname=\"" + where + "\" timeout=" + std::to_string(get_database_timeout_s(where)));
+             "dbname=\"" + where + "\" timeout=" + std::to_string(get_timeout_s(where)));
   }
 }
 
 /// Returns true if a later attempt can succeed: another program holds a lock, or the file cannot be
 /// opened or read.
-bool is_transient_database_error(const soci::soci_error& error) {
+bool is_transient_error(const soci::soci_error& error) {
   if (const auto* file = dynamic_cast<const soci::sqlite3_soci_error*>(&error)) {
     constexpr int without_extension = 0xff;
     const int result = file->result() & without_extension;
@@ -86,7 +86,7 @@ bool lacks_privilege(const soci::soci_error& error) {
   return server != nullptr && server->sqlstate() == insufficient_privilege;
 }
 
-/// Closes a connection without progress for get_database_timeout_s(). libpq waits forever for a
+/// Closes a connection without progress for get_timeout_s(). libpq waits forever for a
 /// frozen server, which does not apply its own limits either.
 class ConnectionWatchdog {
  public:
@@ -155,7 +155,7 @@ struct Records::Database {
     if (what.starts_with(soci)) what.erase(0, soci.size());
     constexpr std::chrono::seconds soon(2);
     const bool refused =
-        std::chrono::steady_clock::now() - begun < soon && is_database_server_responding(where);
+        std::chrono::steady_clock::now() - begun < soon && is_server_responding(where);
     // [STATION-1] `records cannot be reached` | no data are lost, but repeated images are not
     //   detected (event `unchecked`) | `--verbose` prints the server's message
     if (!refused)
@@ -168,7 +168,7 @@ struct Records::Database {
 
   /// Runs an action; its errors name the database.
   template <typename Action>
-  auto add_database_name_to_error(const Action& action) {
+  auto with_database_name(const Action& action) {
     const auto begun = std::chrono::steady_clock::now();
     try {
       return action();
@@ -183,7 +183,7 @@ struct Records::Database {
       if (lacks_privilege(error)) {
         throw RecordsRefused(name, "the user of the records lacks a right: " + what);
       }
-      if (is_transient_database_error(error)) throw RecordsOffline(name, "the records: " + what);
+      if (is_transient_error(error)) throw RecordsOffline(name, "the records: " + what);
       throw InputError(name, "the records: " + what);
     } catch (const std::exception& error) {
       throw InputError(name, error.what());
@@ -194,7 +194,7 @@ struct Records::Database {
   /// watch.
   template <typename Action>
   auto run(const Action& action, int timeout_factor = 1) {
-    return add_database_name_to_error([&] {
+    return with_database_name([&] {
       try {
         return run_with_timeout(action, timeout_factor);
       } catch (const soci::soci_error&) {
@@ -351,9 +351,9 @@ std::vector<double> extract_trend_values(std::span<const TrendPoint> points) {
 Records::Records(const std::string& where) : database_(std::make_unique<Database>()) {
   database_->where = where;
   database_->name = describe_database(where);
-  database_->timeout_s = get_database_timeout_s(where);
+  database_->timeout_s = get_timeout_s(where);
   soci::session& sql = database_->sql;
-  database_->add_database_name_to_error([&] { open_database_session(sql, where); });
+  database_->with_database_name([&] { open_database_session(sql, where); });
   const bool are_there = database_->run([&](ConnectionWatchdog& watch) {
     configure_connection(sql, database_->timeout_s);
     watch.on_progress();
@@ -370,7 +370,7 @@ Records::~Records() = default;
 void Records::store_run(const RunRecord& record, const std::string& destination) {
   database_->run([&](ConnectionWatchdog& watch) {
     soci::session& sql = database_->sql;
-    const RunRecord escaped = escape_texts_of_run(record);
+    const RunRecord escaped = escape_run(record);
     const RunRows rows = make_run_rows(serialize_run(escaped));
     soci::transaction transaction(sql);
     // Writes first, so that the transaction waits for others before it reads.
@@ -382,12 +382,12 @@ void Records::store_run(const RunRecord& record, const std::string& destination)
     }
     const auto new_events = insert_events(sql, escaped, watch);
     // Last, because all stations that share the records wait for it.
-    append_run_events_to_audit_trail(sql, escaped.run, is_new ? rows.document : "", new_events);
+    append_to_trail(sql, escaped.run, is_new ? rows.document : "", new_events);
     transaction.commit();
   });
 }
 
-void Records::remove_delivered_run(const RunRecord& record) {
+void Records::remove_delivered(const RunRecord& record) {
   database_->run([&](ConnectionWatchdog&) {
     soci::session& sql = database_->sql;
     soci::transaction transaction(sql);
@@ -400,7 +400,7 @@ void Records::remove_delivered_run(const RunRecord& record) {
   });
 }
 
-void Records::check_database_writable() {
+void Records::check_writable() {
   database_->run([&](ConnectionWatchdog&) {
     soci::transaction transaction(database_->sql);
     lock_audit_trail(database_->sql);
@@ -447,7 +447,7 @@ std::optional<RunRecord> Records::find_run_by_id(const std::string& run) {
   return database_->run([&](ConnectionWatchdog&) { return load_run(database_->sql, run); });
 }
 
-TrailCheck Records::check_records_by_audit_trail(const std::string& expected_digest) {
+TrailCheck Records::check_trail(const std::string& expected_digest) {
   return database_->run(
       [&](ConnectionWatchdog& watch) {
         soci::session& sql = database_->sql;

@@ -88,7 +88,7 @@ class RecordsRefused : public RecordsOffline {
 ///   message states,
 /// - the file cannot be opened,
 /// - another program holds a lock, or
-/// - the time limit expired: get_database_timeout_s(), 10 times that for queries of many runs
+/// - the time limit expired: get_timeout_s(), 10 times that for queries of many runs
 ///   (without RunFilter::image_sha256).
 class Records {
  public:
@@ -102,18 +102,18 @@ class Records {
   /// @param destination  identity of other records, to which the run is to be delivered; else empty
   void store_run(const RunRecord& record, const std::string& destination = "");
   /// Removes a delivered run with its trail, unless an event was added since it was read.
-  void remove_delivered_run(const RunRecord& record);
+  void remove_delivered(const RunRecord& record);
   /// Returns a complete run; std::nullopt if no run has this id.
   std::optional<RunRecord> find_run_by_id(const std::string& run);
   /// Checks that runs can be stored now. Throws InputError otherwise.
-  void check_database_writable();
+  void check_writable();
   /// Returns the runs that match the filter, in chronological order.
   std::vector<RunSummary> list_run_summaries(const RunFilter& filter);
   /// Returns the values of a metric in the runs that match the filter, without voided runs.
   std::vector<TrendPoint> load_metric_trend(const std::string& metric, const RunFilter& filter);
   /// Checks by the trail (audit_trail.h) that the records are unchanged. `expected_digest` is the
   /// last digest of an earlier check, which the trail must still contain, or empty.
-  TrailCheck check_records_by_audit_trail(const std::string& expected_digest);
+  TrailCheck check_trail(const std::string& expected_digest);
 
  private:
   struct Database;

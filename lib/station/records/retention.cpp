@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 bool is_older(const std::string& utc, int days) {
   constexpr double seconds_per_day = 86'400;
-  return compute_age_of_utc_s(utc) > days * seconds_per_day;  // false for an invalid time
+  return compute_utc_age_s(utc) > days * seconds_per_day;  // false for an invalid time
 }
 
 std::vector<fs::path> list_folders_in(const fs::path& folder) {
@@ -55,7 +55,7 @@ std::uintmax_t count_bytes_in_folder(const fs::path& folder) {
 
 /// Returns true if a file is opened through a folder: by its name, or by a link on the way. Returns
 /// true as well if a link cannot be followed, so that a folder in doubt is kept.
-bool is_path_through_folder(const fs::path& file, const fs::path& folder) {
+bool is_path_through(const fs::path& file, const fs::path& folder) {
   constexpr int max_links = 40;  // as in the kernel
   std::error_code error;
   const fs::path absolute = fs::absolute(file, error);
@@ -91,14 +91,14 @@ bool is_path_through_folder(const fs::path& file, const fs::path& folder) {
 bool is_in_use(const fs::path& folder, const StationConfig& config) {
   std::vector<fs::path> needed = config.inputs;
   needed.insert(needed.end(), {config.spool, config.captures, config.results});
-  if (!is_database_server_address(config.records)) needed.emplace_back(config.records);
+  if (!is_server_address(config.records)) needed.emplace_back(config.records);
   if (config.hook) {  // its arguments can be files, such as the script of an interpreter
     for (const std::string& word : config.hook->command) {
       if (!word.empty()) needed.push_back(config.hook->folder / word);
     }
   }
   return std::any_of(needed.begin(), needed.end(), [&](const fs::path& file) {
-    return !file.empty() && is_path_through_folder(file, folder);
+    return !file.empty() && is_path_through(file, folder);
   });
 }
 
@@ -121,7 +121,7 @@ void add_if_expired(RetentionResult& found, Records& records, const StationConfi
 }
 
 SharedFolder open_existing(const SharedFolder& parent, const Id& name) {
-  auto found = parent.open_subfolder_if_exists(name);
+  auto found = parent.open_if_exists(name);
   if (!found)
     throw InputError(parent.folder_path() / name.id_text(), "cannot be deleted: it is not there");
   return std::move(*found);
@@ -137,7 +137,7 @@ SharedFolder open_parent(const ExpiredFolder& expired, const StationConfig& conf
 
 }  // namespace
 
-RetentionResult find_expired_run_folders(const StationConfig& config, Records& records) {
+RetentionResult list_expired_folders(const StationConfig& config, Records& records) {
   RetentionResult found;
   if (const auto& days = config.retention.images_days) {
     for (const fs::path& folder : list_folders_in(config.captures)) {
@@ -159,26 +159,26 @@ RetentionResult find_expired_run_folders(const StationConfig& config, Records& r
   return found;
 }
 
-void check_clock_against_recorded_runs(const StationConfig& config, Records& records) {
+void check_clock(const StationConfig& config, Records& records) {
   constexpr double day_s = 86'400;
   constexpr double max_idle_s = 366 * day_s;  // longer than a plant is shut
   constexpr double max_ahead_s = day_s;       // between computers that share records
   constexpr int trusted_days = 7;             // within them a wrong clock is noticed
   std::vector<std::string> ended;
   for (const RunSummary& run : records.list_run_summaries({.station = config.station})) {
-    const bool is_time = !std::isnan(compute_age_of_utc_s(run.ended_utc));
+    const bool is_time = !std::isnan(compute_utc_age_s(run.ended_utc));
     if (run.voided.empty() && is_time) ended.push_back(run.ended_utc);
   }
   std::sort(ended.begin(), ended.end());
   if (ended.empty()) return;
   const std::string& newest = ended.back();
-  if (compute_age_of_utc_s(newest) < -max_ahead_s) {
+  if (compute_utc_age_s(newest) < -max_ahead_s) {
     throw InputError(config.file,
                      fmt::format("the newest run ended {}, after the clock, {}: set the clock, or, "
                                  "if it is right, void the runs with wrong dates",
                                  newest, get_current_utc()));
   }
-  if (compute_age_of_utc_s(newest) > max_idle_s) {
+  if (compute_utc_age_s(newest) > max_idle_s) {
     throw InputError(
         config.file,
         fmt::format("the newest run ended {}, more than a year before the clock, {}: set "
@@ -186,9 +186,9 @@ void check_clock_against_recorded_runs(const StationConfig& config, Records& rec
                     newest, get_current_utc()));
   }
   for (std::size_t i = ended.size() - 1; i > 0; --i) {
-    const double age_s = compute_age_of_utc_s(ended[i]);
+    const double age_s = compute_utc_age_s(ended[i]);
     if (age_s > trusted_days * day_s) return;
-    if (compute_age_of_utc_s(ended[i - 1]) - age_s < max_idle_s) continue;
+    if (compute_utc_age_s(ended[i - 1]) - age_s < max_idle_s) continue;
     throw InputError(config.file,
                      fmt::format("the runs since {} ended more than a year after those before: set "
                                  "the clock and void them, or, if it is right, clean again when "
@@ -197,12 +197,11 @@ void check_clock_against_recorded_runs(const StationConfig& config, Records& rec
   }
 }
 
-void delete_expired_run_folder(const ExpiredFolder& expired, const StationConfig& config,
-                               Spool& spool) {
+void delete_expired(const ExpiredFolder& expired, const StationConfig& config, Spool& spool) {
   const SharedFolder parent = open_parent(expired, config);
   const Id name(expired.folder.filename().string(), expired.folder, "run");
-  open_existing(parent, name).remove_all_folder_entries();
-  if (find_index_of_last_event_of_kind(expired.run, expired.event_kind) < 0) {
+  open_existing(parent, name).remove_all();
+  if (get_last_event_index(expired.run, expired.event_kind) < 0) {
     constexpr double megabyte = 1e6;
     RunRecord run = expired.run;
     run.events.push_back(make_run_event_now(

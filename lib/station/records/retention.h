@@ -37,20 +37,19 @@ struct RetentionResult {
 /// and the end of each run in the records. The folders are those of images, CAPTURES/CAMERA.RUN,
 /// and of results, RESULTS/CAMERA/RUN. Ignores other names, such as folders in which images still
 /// arrive, runs of other stations, and symbolic links.
-RetentionResult find_expired_run_folders(const StationConfig& config, Records& records);
+RetentionResult list_expired_folders(const StationConfig& config, Records& records);
 
 /// Checks the clock, because all runs appear expired if it is years ahead. Ignores voided runs.
 /// Throws InputError if the newest run of the station ended after the clock's time or more than a
 /// year before it. Also throws it if the runs of the last seven days ended more than a year after
 /// the previous ones. A wrong clock with which runs were recorded for more than seven days is not
 /// detected.
-void check_clock_against_recorded_runs(const StationConfig& config, Records& records);
+void check_clock(const StationConfig& config, Records& records);
 
 /// Deletes the folder of a run, without following links below `config.captures` and
 /// `config.results`. The event is recorded when the folder is empty, and the folder itself is
 /// deleted last. A program that is killed before the event is recorded therefore finds the folder
 /// again. Throws InputError.
-void delete_expired_run_folder(const ExpiredFolder& expired, const StationConfig& config,
-                               Spool& spool);
+void delete_expired(const ExpiredFolder& expired, const StationConfig& config, Spool& spool);
 
 }  // namespace vlp

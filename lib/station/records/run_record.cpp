@@ -65,11 +65,11 @@ std::string describe_account() {
 
 }  // namespace
 
-void RunRecord::set_verdict_from_causes(std::vector<Cause> new_causes) {
+void RunRecord::set_causes(std::vector<Cause> new_causes) {
   if (std::string problem = describe_clock_problem(*this); !problem.empty()) {
     new_causes.insert(new_causes.begin(), {std::move(problem), false});
   }
-  verdict = verdict_name(decide_verdict_from_causes(new_causes));
+  verdict = verdict_name(decide_verdict(new_causes));
   causes.clear();
   for (const Cause& cause : new_causes) causes.append(cause.text).append("\n");
 }
@@ -79,7 +79,7 @@ void RunRecord::invalidate_verdict(const std::string& reason) {
   causes = reason + "\n" + causes;
 }
 
-const CheckedMetric* RunRecord::find_metric_by_name(std::string_view name) const {
+const CheckedMetric* RunRecord::find_metric(std::string_view name) const {
   const auto metric = std::ranges::find(metrics, name, &CheckedMetric::name);
   return metric == metrics.end() ? nullptr : &*metric;
 }
@@ -93,26 +93,24 @@ const RunEvent* find_voiding_event(const RunRecord& record) {
   return event == record.events.end() ? nullptr : &*event;
 }
 
-std::ptrdiff_t find_index_of_last_event_of_kind(const RunRecord& record, const char* kind) {
+std::ptrdiff_t get_last_event_index(const RunRecord& record, const char* kind) {
   const auto event = std::find_if(record.events.rbegin(), record.events.rend(),
                                   [&](const RunEvent& each) { return each.kind == kind; });
   return record.events.rend() - event - 1;
 }
 
-std::string format_run_voiding_command(const std::string& run,
-                                       const std::filesystem::path& station_file) {
+std::string format_void_command(const std::string& run, const std::filesystem::path& station_file) {
   return fmt::format("vlp-station void {} --station {} --operator NAME --reason WHY", run,
                      station_file.string());
 }
 
-std::string describe_run_using_image(const ImageUser& owner,
-                                     const std::filesystem::path& station_file) {
+std::string describe_image_user(const ImageUser& owner, const std::filesystem::path& station_file) {
   // [STATION-6] `if its serial was`
   return fmt::format("camera {}, run {}: if its serial was wrong, '{}' frees its images",
-                     owner.camera, owner.run, format_run_voiding_command(owner.run, station_file));
+                     owner.camera, owner.run, format_void_command(owner.run, station_file));
 }
 
-bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier) {
+bool has_images_of(const RunRecord& run, const RunRecord& earlier) {
   if (run.camera != earlier.camera || run.run == earlier.run) return false;
   std::set<std::string> earlier_digests;
   for (const RunRecord::Image& image : earlier.images) {
@@ -124,7 +122,7 @@ bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier) 
          });
 }
 
-std::string describe_why_verdict_is_void_or_edited(const RunRecord& record) {
+std::string explain_void_verdict(const RunRecord& record) {
   if (const RunEvent* event = find_voiding_event(record)) {
     return fmt::format("was voided by {}: {}", event->author, event->text);
   }
@@ -133,8 +131,7 @@ std::string describe_why_verdict_is_void_or_edited(const RunRecord& record) {
   constexpr const char* words = "the record has PASS, but {}: it was changed by hand";
   if (!record.causes.empty()) return fmt::format(words, "names a cause");
   for (const CheckedMetric& metric : record.metrics) {
-    if (metric.limit && !metric.has_passed_gate())
-      return fmt::format(words, describe_gate_result(metric));
+    if (metric.limit && !metric.has_passed_gate()) return fmt::format(words, describe_gate(metric));
   }
   return "";
 }
@@ -168,7 +165,7 @@ RunEvent make_run_event_now(const std::string& kind, const std::string& text,
                                 : fmt::format("{} ({})", operator_name, describe_account())};
 }
 
-double compute_age_of_utc_s(const std::string& utc) {
+double compute_utc_age_s(const std::string& utc) {
   const auto time = parse_utc(utc);
   return time ? std::difftime(current_time_s(), *time) : std::numeric_limits<double>::quiet_NaN();
 }
@@ -193,7 +190,7 @@ std::string list_library_versions() {
                      EIGEN_MINOR_VERSION);
 }
 
-std::span<const RunField> list_run_text_fields() {
+std::span<const RunField> list_run_fields() {
   static constexpr std::array fields{
       RunField{"run", &RunRecord::run, "run"},
       RunField{"kind", &RunRecord::kind},
@@ -212,20 +209,20 @@ std::span<const RunField> list_run_text_fields() {
   return fields;
 }
 
-RunRecord escape_texts_of_run(RunRecord run) {
-  for (const RunField& field : list_run_text_fields()) {
+RunRecord escape_run(RunRecord run) {
+  for (const RunField& field : list_run_fields()) {
     const bool has_lines =
         field.text == &RunRecord::causes || field.text == &RunRecord::calibration;
     std::string& text = run.*field.text;
-    text = has_lines ? escape_text_for_terminal(text) : escape_text_for_single_line(text);
+    text = has_lines ? escape_for_terminal(text) : escape_for_line(text);
   }
   for (RunRecord::Image& image : run.images) {
-    image.name = escape_text_for_single_line(image.name);
-    image.rejection = escape_text_for_single_line(image.rejection);
+    image.name = escape_for_line(image.name);
+    image.rejection = escape_for_line(image.rejection);
   }
   for (RunEvent& event : run.events) {
-    event.text = escape_text_for_single_line(event.text);
-    event.author = escape_text_for_single_line(event.author);
+    event.text = escape_for_line(event.text);
+    event.author = escape_for_line(event.author);
   }
   return run;
 }
@@ -237,9 +234,8 @@ std::string describe_clock_problem(const RunRecord& run) {
       run.ended_utc, run.begun_utc);
 }
 
-RunRecord make_common_run_record(const char* kind, const StationConfig& config,
-                                 const std::string& camera, const std::string& run,
-                                 const ProgramVersion& program) {
+RunRecord make_run_record(const char* kind, const StationConfig& config, const std::string& camera,
+                          const std::string& run, const ProgramVersion& program) {
   RunRecord record;
   record.run = run;
   record.kind = kind;
@@ -268,12 +264,12 @@ std::string join_lines(std::string text) {
   return joined;
 }
 
-/// Returns list_unit_metric_kinds() and the other metrics of these runs.
+/// Returns list_unit_metrics() and the other metrics of these runs.
 std::vector<MetricKind> list_columns(const std::vector<RunRecord>& runs) {
-  auto kinds = list_unit_metric_kinds();
+  auto kinds = list_unit_metrics();
   for (const MetricKind& kind : list_metric_kinds({MetricSource::evaluation})) {
     const auto has_kind = [&](const RunRecord& run) {
-      return run.find_metric_by_name(kind.name) != nullptr;
+      return run.find_metric(kind.name) != nullptr;
     };
     if (std::ranges::any_of(runs, has_kind)) kinds.push_back(kind);
   }
@@ -283,20 +279,20 @@ std::vector<MetricKind> list_columns(const std::vector<RunRecord>& runs) {
 void write_csv(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
   const auto kinds = list_columns(runs);
   std::vector<std::string> header;
-  for (const RunField& field : list_run_text_fields()) {
+  for (const RunField& field : list_run_fields()) {
     if (field.is_column) header.emplace_back(field.name);
   }
   for (const MetricKind& kind : kinds) header.emplace_back(kind.name);
   CsvWriter csv(file, header);
   for (const RunRecord& run : runs) {
     std::vector<std::string> row;
-    for (const RunField& field : list_run_text_fields()) {
+    for (const RunField& field : list_run_fields()) {
       if (field.is_column) row.push_back(join_lines(run.*field.text));
     }
     for (const MetricKind& kind : kinds) {
-      const CheckedMetric* metric = run.find_metric_by_name(kind.name);
+      const CheckedMetric* metric = run.find_metric(kind.name);
       const bool has_value = metric != nullptr && metric->value;
-      row.push_back(has_value ? format_significant_digits(*metric->value, kDigits) : "");
+      row.push_back(has_value ? format_digits(*metric->value, kDigits) : "");
     }
     csv.write_csv_row(row);
   }
@@ -314,7 +310,7 @@ std::optional<double> read_optional_number(const Json& json) {
 Json make_run_json(const RunRecord& run) {
   Json json;
   json["format"] = kRunFormat;
-  for (const RunField& field : list_run_text_fields()) json[field.name] = run.*field.text;
+  for (const RunField& field : list_run_fields()) json[field.name] = run.*field.text;
   json["metrics"] = Json::object();
   for (const CheckedMetric& metric : run.metrics) {
     Json& entry = json["metrics"][metric.name];
@@ -352,7 +348,7 @@ Json make_run_json_with_events(const RunRecord& run) {
 RunRecord parse_run(const Json& json) {
   if (json.at("format") != kRunFormat) throw std::runtime_error("another format");
   RunRecord run;
-  for (const RunField& field : list_run_text_fields()) json.at(field.name).get_to(run.*field.text);
+  for (const RunField& field : list_run_fields()) json.at(field.name).get_to(run.*field.text);
   // [STATION-12] `no verdict`
   if (run.run.empty() || run.verdict.empty()) throw std::runtime_error("no run, or no verdict");
   for (const auto& [name, metric] : json.at("metrics").items()) {
@@ -383,13 +379,13 @@ std::string serialize(const Json& json, int indent) {
 }  // namespace
 
 std::string serialize_run(const RunRecord& run) {
-  return serialize(make_run_json(escape_texts_of_run(run)), -1);
+  return serialize(make_run_json(escape_run(run)), -1);
 }
 
 RunRecord parse_run_document(const std::string& document) {
   try {
     if (document.size() > kMaxDocumentBytes) throw std::runtime_error("it has more than 16 MiB");
-    check_json_size_and_depth(document);
+    check_json_limits(document);
     return parse_run(Json::parse(document));
   } catch (const std::exception& error) {
     // [STATION-12] `no run of a station` | run edited by hand | compare with a backup
@@ -400,16 +396,15 @@ RunRecord parse_run_document(const std::string& document) {
 std::string format_hook_json(const RunRecord& run) {
   Json json;
   json["event"] = find_voiding_event(run) != nullptr ? "voided" : "verdict";
-  json.update(make_run_json_with_events(escape_texts_of_run(run)));
+  json.update(make_run_json_with_events(escape_run(run)));
   return serialize(json, 1);
 }
 
-void export_runs_to_file(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
+void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs) {
   if (file.extension() == ".csv") return write_csv(file, runs);
   if (file.extension() != ".json") throw InputError(file, "should end in .csv or .json");
   Json all = Json::array();
-  for (const RunRecord& run : runs)
-    all.push_back(make_run_json_with_events(escape_texts_of_run(run)));
+  for (const RunRecord& run : runs) all.push_back(make_run_json_with_events(escape_run(run)));
   write_file(file, serialize(all, 1));
 }
 

@@ -68,16 +68,16 @@ struct RunRecord {
   std::vector<RunEvent> events;
 
   /// Returns the metric of this name; null if there is none.
-  const CheckedMetric* find_metric_by_name(std::string_view name) const;
+  const CheckedMetric* find_metric(std::string_view name) const;
   /// Returns the number of images that were used.
   std::ptrdiff_t count_used_images() const;
   bool has_run_passed() const { return verdict == verdict_name(Verdict::pass); }
   bool is_verdict_invalid() const { return verdict == verdict_name(Verdict::invalid); }
   /// Returns the first cause, in one line; empty if the run passed.
-  std::string first_verdict_cause() const { return causes.substr(0, causes.find('\n')); }
+  std::string first_cause() const { return causes.substr(0, causes.find('\n')); }
   /// Sets verdict and causes from `new_causes`, the most important cause first. A wrong clock
   /// (describe_clock_problem()) precedes all.
-  void set_verdict_from_causes(std::vector<Cause> new_causes);
+  void set_causes(std::vector<Cause> new_causes);
   /// Makes the run INVALID for another reason, which precedes the others.
   void invalidate_verdict(const std::string& reason);
 };
@@ -91,26 +91,24 @@ struct ImageUser {
 };
 
 /// Returns the command that voids a run of the station of this file, with all its options.
-std::string format_run_voiding_command(const std::string& run,
-                                       const std::filesystem::path& station_file);
+std::string format_void_command(const std::string& run, const std::filesystem::path& station_file);
 
 /// Describes the owner of an image, and how to free it if the owner's serial was wrong.
-std::string describe_run_using_image(const ImageUser& owner,
-                                     const std::filesystem::path& station_file);
+std::string describe_image_user(const ImageUser& owner, const std::filesystem::path& station_file);
 
 /// Returns true if `run` uses images, and `earlier` used all of them; both of one camera.
-bool uses_images_of_earlier_run(const RunRecord& run, const RunRecord& earlier);
+bool has_images_of(const RunRecord& run, const RunRecord& earlier);
 
 /// Returns the event that voided a run; null if it is not voided.
 const RunEvent* find_voiding_event(const RunRecord& record);
 
 /// Returns the index of the last event of a kind; -1 if there is none.
-std::ptrdiff_t find_index_of_last_event_of_kind(const RunRecord& record, const char* kind);
+std::ptrdiff_t get_last_event_index(const RunRecord& record, const char* kind);
 
 /// Returns the reason why the verdict of a record is not valid; empty if it is valid. The verdict
 /// is not valid if the run was voided, or if it is PASS despite a failed gate or a cause. The
 /// latter shows that the record was edited.
-std::string describe_why_verdict_is_void_or_edited(const RunRecord& record);
+std::string explain_void_verdict(const RunRecord& record);
 
 /// Text member of a record: a key of its document.
 struct RunField {
@@ -123,9 +121,9 @@ struct RunField {
 };
 
 /// Returns all text members of a record, in order. A new text requires a member of RunRecord, an
-/// entry in list_run_text_fields(), code that sets it (make_common_run_record() or the program),
+/// entry in list_run_fields(), code that sets it (make_run_record() or the program),
 /// and another kSchemaVersion.
-std::span<const RunField> list_run_text_fields();
+std::span<const RunField> list_run_fields();
 
 /// Returns the id of a run that starts now, or of an event, 20261121T134501Z-0123456789abcdef: UTC,
 /// microseconds in 5 hexadecimal digits and 11 random ones. Ids sort by time to the microsecond,
@@ -142,12 +140,12 @@ std::string get_current_utc();
 std::string describe_utc_problem(const std::string& text);
 /// Returns the time since a UTC as 2026-11-21T13:45:01Z, s: negative for a future time, NaN for an
 /// invalid text.
-double compute_age_of_utc_s(const std::string& utc);
+double compute_utc_age_s(const std::string& utc);
 
 /// Returns the run with texts that are safe for terminals, reports and records:
-/// escape_text_for_terminal(), and escape_text_for_single_line() for operators and for names of
+/// escape_for_terminal(), and escape_for_line() for operators and for names of
 /// images and events.
-RunRecord escape_texts_of_run(RunRecord run);
+RunRecord escape_run(RunRecord run);
 
 /// Returns the cause INVALID of a run whose end is before its start, because the clock was set
 /// back; empty if there is none.
@@ -155,20 +153,19 @@ std::string describe_clock_problem(const RunRecord& run);
 
 /// Makes the common part of the records of units and golden units for a run that ends now: all
 /// members except verdict, inputs and operator.
-RunRecord make_common_run_record(const char* kind, const StationConfig& config,
-                                 const std::string& camera, const std::string& run,
-                                 const ProgramVersion& program);
+RunRecord make_run_record(const char* kind, const StationConfig& config, const std::string& camera,
+                          const std::string& run, const ProgramVersion& program);
 
 /// Returns OpenCV, Ceres, mrcal and other libraries with their versions.
 std::string list_library_versions();
 
 /// Serializes a run without its events as a JSON document of one line, format `vlp-run/3`
 /// (datasets/schemas/run.schema.json). Records store this text, and its SHA-256 is the digest of
-/// the run. Its texts are those of escape_texts_of_run().
+/// the run. Its texts are those of escape_run().
 std::string serialize_run(const RunRecord& run);
 /// Reads a document of serialize_run().
 /// @throws std::runtime_error if the text is no such document, has no run or verdict, or exceeds
-///   check_json_size_and_depth() or 16 MiB
+///   check_json_limits() or 16 MiB
 RunRecord parse_run_document(const std::string& document);
 
 /// Returns the JSON for the hook: "event" ("verdict", or "voided" for a voided run), then the
@@ -178,9 +175,9 @@ std::string format_hook_json(const RunRecord& run);
 /// Writes runs atomically, in the format of the file's extension. Throws InputError, also for
 /// another extension.
 ///
-///   .csv   one row per run: the texts of list_run_text_fields() with RunField::is_column, and one
+///   .csv   one row per run: the texts of list_run_fields() with RunField::is_column, and one
 ///          column per metric, empty if missing
 ///   .json  list of the documents of serialize_run(), each with "events"
-void export_runs_to_file(const std::filesystem::path& file, const std::vector<RunRecord>& runs);
+void write_runs(const std::filesystem::path& file, const std::vector<RunRecord>& runs);
 
 }  // namespace vlp

@@ -28,7 +28,7 @@ constexpr std::uintmax_t kRequiredSpace_bytes = 1'000'000;
 
 /// Returns the operator's message about offline records; empty if only the error contains the
 /// remedy.
-std::string make_offline_notice(const InputError& error) {
+std::string make_offline_note(const InputError& error) {
   if (dynamic_cast<const RecordsRefused*>(&error) != nullptr) {
     return "records are offline (access refused)";
   }
@@ -40,7 +40,7 @@ std::string make_offline_notice(const InputError& error) {
 Spool::Spool(fs::path folder, std::string records)
     : folder_(std::move(folder)),
       where_(std::move(records)),
-      name_(escape_text_for_single_line(derive_database_identity(where_))) {}
+      name_(escape_for_line(derive_identity(where_))) {}
 
 /// Opens the outbox anew for each access, because the folder can be replaced meanwhile.
 Records Spool::open_outbox() const {
@@ -71,10 +71,10 @@ void Spool::query_outbox(const std::function<void(Records&)>& query) {
 }
 
 /// Runs an action on the records. Returns the reason if it failed; empty on success.
-std::string Spool::try_database_action(const std::function<void(Records&)>& action) {
+std::string Spool::try_action(const std::function<void(Records&)>& action) {
   try {
     std::error_code none;
-    if (!records_ && !is_database_server_address(where_) && !fs::exists(where_, none)) {
+    if (!records_ && !is_server_address(where_) && !fs::exists(where_, none)) {
       throw RecordsOffline(where_, "there are no records");
     }
     if (!records_) records_ = std::make_unique<Records>(where_);
@@ -85,22 +85,22 @@ std::string Spool::try_database_action(const std::function<void(Records&)>& acti
   } catch (const InputError& error) {
     const bool is_offline = dynamic_cast<const RecordsOffline*>(&error) != nullptr;
     offline_reason_.clear();
-    if (is_offline || !records_) suspend_database_access(error.what(), make_offline_notice(error));
+    if (is_offline || !records_) suspend(error.what(), make_offline_note(error));
     return error.what();
   }
 }
 
 /// Returns false if the records did not answer, now or within the last minute.
 bool Spool::query_records(const std::function<void(Records&)>& query) {
-  if (!may_access_database()) return false;
-  const std::string problem = try_database_action(query);
-  if (!problem.empty() && offline_reason_.empty()) suspend_database_access(problem, "");
+  if (!may_access()) return false;
+  const std::string problem = try_action(query);
+  if (!problem.empty() && offline_reason_.empty()) suspend(problem, "");
   return problem.empty();
 }
 
-bool Spool::may_access_database() const { return Clock::now() >= next_access_; }
+bool Spool::may_access() const { return Clock::now() >= next_access_; }
 
-void Spool::suspend_database_access(const std::string& reason, const std::string& notice) {
+void Spool::suspend(const std::string& reason, const std::string& notice) {
   constexpr std::chrono::minutes a_while(1);
   next_access_ = Clock::now() + a_while;
   offline_reason_ = reason;
@@ -109,21 +109,21 @@ void Spool::suspend_database_access(const std::string& reason, const std::string
 
 Records& Spool::records_or_throw() {
   if (query_records([](Records&) {})) return *records_;
-  throw RecordsUnavailable(folder_.empty() ? offline_reason_ : make_spool_notice_for_operator(),
+  throw RecordsUnavailable(folder_.empty() ? offline_reason_ : make_operator_notice(),
                            offline_reason_);
 }
 
-void Spool::check_runs_can_be_stored() {
+void Spool::check_can_store() {
   create_station_folder(folder_);
-  require_writable_folder_with_space(SharedFolder(folder_), kRequiredSpace_bytes);
-  open_outbox().check_database_writable();
+  require_space(SharedFolder(folder_), kRequiredSpace_bytes);
+  open_outbox().check_writable();
   try {
     if (!records_) records_ = std::make_unique<Records>(where_);
   } catch (const RecordsOffline& error) {
-    return suspend_database_access(error.what(), make_offline_notice(error));
+    return suspend(error.what(), make_offline_note(error));
   }
-  problem_ = try_database_action([](Records& records) { records.check_database_writable(); });
-  if (problem_.empty()) deliver_waiting_runs();
+  problem_ = try_action([](Records& records) { records.check_writable(); });
+  if (problem_.empty()) deliver_waiting();
 }
 
 void Spool::store_run(const RunRecord& run) {
@@ -131,8 +131,7 @@ void Spool::store_run(const RunRecord& run) {
   try {
     open_outbox().store_run(run, name_);
   } catch (const InputError& error) {
-    const std::string refused =
-        try_database_action([&](Records& records) { records.store_run(run); });
+    const std::string refused = try_action([&](Records& records) { records.store_run(run); });
     if (refused.empty()) return;
     throw InputError(
         folder_,
@@ -141,10 +140,10 @@ void Spool::store_run(const RunRecord& run) {
   }
 }
 
-void Spool::deliver_waiting_runs() {
+void Spool::deliver_waiting() {
   constexpr std::chrono::seconds max_duration(10);
   const auto begun = Clock::now();
-  if (!may_access_database()) return;
+  if (!may_access()) return;
   problem_.clear();
   for (const RunSummary& waiting : list_waiting_runs()) {
     if (Clock::now() - begun > max_duration) {
@@ -154,18 +153,17 @@ void Spool::deliver_waiting_runs() {
     std::optional<RunRecord> run;
     query_outbox([&](Records& outbox) { run = outbox.find_run_by_id(waiting.run); });
     if (run) {
-      const std::string refused =
-          try_database_action([&](Records& records) { records.store_run(*run); });
+      const std::string refused = try_action([&](Records& records) { records.store_run(*run); });
       if (!offline_reason_.empty()) return;
       if (!refused.empty()) problem_ = refused;
       if (!refused.empty()) continue;
-      query_outbox([&](Records& outbox) { outbox.remove_delivered_run(*run); });
+      query_outbox([&](Records& outbox) { outbox.remove_delivered(*run); });
     }
     if (!unread_.empty()) problem_ = unread_;
   }
 }
 
-std::string Spool::append_spool_remarks(const std::string& first) {
+std::string Spool::append_remarks(const std::string& first) {
   std::vector<RunSummary> others;
   query_outbox([&](Records& outbox) { others = outbox.list_run_summaries({}); });
   std::erase_if(others, [&](const RunSummary& run) { return run.destination == name_; });
@@ -182,24 +180,23 @@ std::string Spool::append_spool_remarks(const std::string& first) {
   return fmt::format("{}", fmt::join(remarks, "; "));
 }
 
-std::string Spool::describe_spool_state() {
+std::string Spool::describe_state() {
   const std::size_t waiting = list_waiting_runs().size();
   const std::string& why = offline_reason_.empty() ? problem_ : offline_reason_;
   if (waiting > 0) {
-    return append_spool_remarks(fmt::format("runs are queued in the spool, {} waiting{}{}", waiting,
-                                            why.empty() ? "" : ": ", why));
+    return append_remarks(fmt::format("runs are queued in the spool, {} waiting{}{}", waiting,
+                                      why.empty() ? "" : ": ", why));
   }
-  return append_spool_remarks(why.empty() ? "" : "runs are queued in the spool: " + why);
+  return append_remarks(why.empty() ? "" : "runs are queued in the spool: " + why);
 }
 
-std::string Spool::make_spool_notice_for_operator() {
-  if (offline_reason_.empty() || offline_notice_.empty()) return describe_spool_state();
+std::string Spool::make_operator_notice() {
+  if (offline_reason_.empty() || offline_notice_.empty()) return describe_state();
   const std::size_t waiting = list_waiting_runs().size();
   const std::string runs = waiting == 0   ? "runs are"
                            : waiting == 1 ? "1 run"
                                           : fmt::format("{} runs", waiting);
-  return append_spool_remarks(
-      fmt::format("{}; {} kept, delivered automatically", offline_notice_, runs));
+  return append_remarks(fmt::format("{}; {} kept, delivered automatically", offline_notice_, runs));
 }
 
 std::vector<RunSummary> Spool::list_waiting_runs() {
@@ -223,8 +220,8 @@ RunRecord Spool::require_run(const std::string& run) {
   return *found;
 }
 
-std::pair<std::vector<RunSummary>, bool> Spool::merge_stored_and_waiting_runs(
-    RunFilter filter, const std::string& destination) {
+std::pair<std::vector<RunSummary>, bool> Spool::merge_runs(RunFilter filter,
+                                                           const std::string& destination) {
   const int last = std::exchange(filter.last, 0);
   std::vector<RunSummary> runs, stored;
   std::set<std::string> waiting_ids;
@@ -250,44 +247,43 @@ std::pair<std::vector<RunSummary>, bool> Spool::merge_stored_and_waiting_runs(
 }
 
 std::vector<RunSummary> Spool::list_run_summaries(const RunFilter& filter) {
-  return merge_stored_and_waiting_runs(filter, name_).first;
+  return merge_runs(filter, name_).first;
 }
 
 /// Returns the first run that uses an image of this digest, of all runs of the outbox and the
 /// records. Counts images that were not compared with the records.
-std::optional<RunSummary> Spool::find_run_that_used_image(
+std::optional<RunSummary> Spool::find_image_user(
     const std::string& sha256, const std::function<bool(const RunSummary&)>& is_searched) {
-  const auto [runs, has_answer] = merge_stored_and_waiting_runs({.image_sha256 = sha256}, "");
+  const auto [runs, has_answer] = merge_runs({.image_sha256 = sha256}, "");
   const auto run = std::ranges::find_if(runs, is_searched);
   if (run != runs.end()) return *run;
   if (!has_answer) ++num_unchecked_;
   return std::nullopt;
 }
 
-ImageUser Spool::find_run_of_other_camera_using_image(const std::string& sha256,
-                                                      const std::string& other_than_camera) {
-  const auto run = find_run_that_used_image(sha256, [&](const RunSummary& user) {
+ImageUser Spool::find_other_user(const std::string& sha256, const std::string& other_than_camera) {
+  const auto run = find_image_user(sha256, [&](const RunSummary& user) {
     return user.camera != other_than_camera && user.voided.empty();
   });
   return run ? ImageUser{run->camera, run->run} : ImageUser{};
 }
 
-std::string Spool::find_golden_run_using_image(const std::string& sha256) {
-  const auto run = find_run_that_used_image(sha256, [](const RunSummary& user) {
+std::string Spool::find_golden_user(const std::string& sha256) {
+  const auto run = find_image_user(sha256, [](const RunSummary& user) {
     return user.kind == "golden" && user.verdict != verdict_name(Verdict::invalid);
   });
   return run ? run->run : "";
 }
 
-std::optional<std::string> Spool::find_run_with_same_images(const RunRecord& run) {
+std::optional<std::string> Spool::find_same_images(const RunRecord& run) {
   const auto first = std::ranges::find_if(run.images, &RunRecord::Image::is_image_used);
   if (first == run.images.end()) return "";
-  auto [earlier_runs, has_answer] = merge_stored_and_waiting_runs(
-      {.camera = run.camera, .kind = "unit", .image_sha256 = first->sha256}, name_);
+  auto [earlier_runs, has_answer] =
+      merge_runs({.camera = run.camera, .kind = "unit", .image_sha256 = first->sha256}, name_);
   for (const RunSummary& earlier : earlier_runs) {
     if (earlier.verdict == verdict_name(Verdict::invalid) || !earlier.voided.empty()) continue;
     const auto record = find_run_by_id(earlier.run);
-    if (record && uses_images_of_earlier_run(run, *record)) return earlier.run;
+    if (record && has_images_of(run, *record)) return earlier.run;
     has_answer = has_answer && record;
   }
   return has_answer ? std::optional<std::string>("") : std::nullopt;

@@ -31,7 +31,7 @@ class RecordsUnavailable : public std::runtime_error {
 /// for them in its spool.
 ///
 /// Runs wait in Records of their own, the SQLite file outbox.db of the spool. Each is delivered
-/// only to the records that it belongs to (derive_database_identity()), so that stations with
+/// only to the records that it belongs to (derive_identity()), so that stations with
 /// different records can share a folder, which should be on a local disk.
 ///
 /// No run is lost if a program is killed at any time. A run is removed from the outbox after the
@@ -47,31 +47,31 @@ class Spool {
   Spool(std::filesystem::path folder, std::string records);
 
   /// Checks before the first image that runs can be stored. Throws InputError if the outbox is not
-  /// writable. Offline or read-only records are no error (describe_spool_state()). Throws for
+  /// writable. Offline or read-only records are no error (describe_state()). Throws for
   /// errors that do not disappear by themselves: tables of a later version, or a file that is no
   /// database. Only this function creates missing records, because a file can also be missing if
   /// its share is not mounted.
-  void check_runs_can_be_stored();
+  void check_can_store();
   /// Stores a run, or its new events, in the outbox. If that is not possible, or without a folder,
   /// the run goes directly into the records. Throws InputError if both fail.
   void store_run(const RunRecord& run);
   /// Delivers the waiting runs to the records, in chronological order. Starts no further run after
   /// ten seconds, so that a backlog delays no caller, and none when the records are offline. A run
   /// that the records reject does not block the others.
-  void deliver_waiting_runs();
+  void deliver_waiting();
   /// Returns a message about the spool; empty if there is nothing to report. The message can
   /// contain
   /// - "runs are queued in the spool, 3 waiting: WHY", or the reason why the records are offline,
   /// - the number of runs for other records,
   /// - the reason why the outbox cannot be read,
   /// - the number of digests that were not compared with the records.
-  std::string describe_spool_state();
-  /// Returns describe_spool_state() for the operator, in one line. The reason why the records are
+  std::string describe_state();
+  /// Returns describe_state() for the operator, in one line. The reason why the records are
   /// offline is replaced by "records are offline; 1 run kept, delivered automatically".
-  std::string make_spool_notice_for_operator();
+  std::string make_operator_notice();
   const std::filesystem::path& spool_folder() const { return folder_; }
   /// Returns the reason why the records were offline at the last access; empty if they were online.
-  const std::string& last_offline_reason() const { return offline_reason_; }
+  const std::string& offline_reason() const { return offline_reason_; }
   /// Returns the records. Throws RecordsUnavailable if they are offline or do not exist.
   Records& records_or_throw();
 
@@ -89,36 +89,35 @@ class Spool {
   std::vector<RunSummary> list_run_summaries(const RunFilter& filter);
   /// Returns the first run of another camera, not voided, that uses an image of this digest; empty
   /// if none does. Searches all runs of the outbox and the records.
-  ImageUser find_run_of_other_camera_using_image(const std::string& sha256,
-                                                 const std::string& other_than_camera);
+  ImageUser find_other_user(const std::string& sha256, const std::string& other_than_camera);
   /// Returns the first judged run of the same unit, not voided, that used all images of `run`
-  /// (uses_images_of_earlier_run()). Searches the waiting runs and the records. Returns an empty
+  /// (has_images_of()). Searches the waiting runs and the records. Returns an empty
   /// string if there is none, and std::nullopt if the records do not answer and no waiting run
   /// matches.
-  std::optional<std::string> find_run_with_same_images(const RunRecord& run);
+  std::optional<std::string> find_same_images(const RunRecord& run);
   /// Returns the first judged run of a golden unit that uses an image of this digest; empty if none
   /// does. Searches all runs of the outbox and the records.
-  std::string find_golden_run_using_image(const std::string& sha256);
+  std::string find_golden_user(const std::string& sha256);
 
  private:
   Records open_outbox() const;
   void query_outbox(const std::function<void(Records&)>& query);
-  std::string try_database_action(const std::function<void(Records&)>& action);
+  std::string try_action(const std::function<void(Records&)>& action);
   bool query_records(const std::function<void(Records&)>& query);
-  bool may_access_database() const;
-  void suspend_database_access(const std::string& reason, const std::string& notice);
+  bool may_access() const;
+  void suspend(const std::string& reason, const std::string& notice);
   /// Returns the runs as list_run_summaries(), with waiting runs for `destination`, for all if it
   /// is empty. Returns false as second value if outbox or records did not answer.
-  std::pair<std::vector<RunSummary>, bool> merge_stored_and_waiting_runs(
-      RunFilter filter, const std::string& destination);
-  std::optional<RunSummary> find_run_that_used_image(
+  std::pair<std::vector<RunSummary>, bool> merge_runs(RunFilter filter,
+                                                      const std::string& destination);
+  std::optional<RunSummary> find_image_user(
       const std::string& sha256, const std::function<bool(const RunSummary&)>& is_searched);
   /// Returns `first`, unless it is empty, and further remarks: runs for other records, an
   /// unreadable outbox, images that were not compared with the records.
-  std::string append_spool_remarks(const std::string& first);
+  std::string append_remarks(const std::string& first);
 
   std::filesystem::path folder_;
-  /// Connection string, and its derive_database_identity(), the destination of waiting runs.
+  /// Connection string, and its derive_identity(), the destination of waiting runs.
   std::string where_, name_;
   std::unique_ptr<Records> records_;
   /// Reason why the records are offline; why a run was not delivered; why the outbox could not be

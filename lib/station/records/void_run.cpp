@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-void check_void_permission(const StationConfig& station, const std::string& operator_name) {
+void check_permission(const StationConfig& station, const std::string& operator_name) {
   const auto& operators = station.void_operators;
   if (operators.empty() ||
       std::find(operators.begin(), operators.end(), operator_name) != operators.end()) {
@@ -26,7 +26,7 @@ void check_void_permission(const StationConfig& station, const std::string& oper
   throw std::invalid_argument(
       fmt::format("operator {} may not void runs of station {}: void_operators in station.yaml has "
                   "those who may",
-                  escape_text_for_single_line(operator_name), station.station));
+                  escape_for_line(operator_name), station.station));
 }
 
 /// Renames the files of a voided run at its station. Returns true if it renamed or tried to;
@@ -40,7 +40,7 @@ bool rename_files(const StationConfig* own_station, const RunRecord& record, std
     return false;
   }
   try {
-    return rename_files_of_voided_run(record, own_station->results);
+    return rename_voided_files(record, own_station->results);
   } catch (const InputError& error) {
     problem = fmt::format("the run is voided, but its files keep their names: {}", error.what());
     return true;
@@ -53,18 +53,18 @@ VoidedRun void_recorded_run(Spool& runs, const StationConfig* station, const std
                             const std::string& operator_name, const std::string& reason) {
   VoidedRun result{runs.require_run(run)};
   RunRecord& record = result.run;
-  const std::string who = escape_text_for_single_line(operator_name);
+  const std::string who = escape_for_line(operator_name);
   if (station != nullptr && record.station != station->station) station = nullptr;
   std::optional<HookLock> lock;
   if (station != nullptr && station->hook) {
     lock.emplace(runs.spool_folder(), record.run);
     // The result of that hook would be mistaken for that of the hook about the voiding.
-    if (!lock->has_acquired_hook_lock()) {
+    if (!lock->is_holding()) {
       throw InputError(record.run, "its hook is being run: void it when that has ended");
     }
     record = runs.require_run(run);  // it can have been voided before the lock was acquired
   }
-  if (station != nullptr) check_void_permission(*station, operator_name);
+  if (station != nullptr) check_permission(*station, operator_name);
   // Each step is done unless it was done before: a voiding by the records alone (--records) lacks
   // those of the station.
   std::string repeated;
@@ -72,20 +72,20 @@ VoidedRun void_recorded_run(Spool& runs, const StationConfig* station, const std
     repeated =
         fmt::format("run {} was voided before, by {}: {}", record.run, event->author, event->text);
   } else {
-    record.events.push_back(make_run_event_now(kVoided, escape_text_for_single_line(reason), who));
+    record.events.push_back(make_run_event_now(kVoided, escape_for_line(reason), who));
   }
-  const bool calls_hook = lock && find_index_of_last_event_of_kind(record, kHookRequested) <
-                                      find_index_of_last_event_of_kind(record, kVoided);
-  if (calls_hook) record.events.push_back(make_hook_requested_event(*station->hook, who));
+  const bool calls_hook =
+      lock && get_last_event_index(record, kHookRequested) < get_last_event_index(record, kVoided);
+  if (calls_hook) record.events.push_back(make_requested_event(*station->hook, who));
   bool is_any_done = repeated.empty() || calls_hook;
   if (is_any_done) runs.store_run(record);
   if (station != nullptr && record.kind == "golden") {
-    is_any_done = delete_golden_unit_note_of_run(*station, record.run) || is_any_done;
+    is_any_done = delete_golden_note(*station, record.run) || is_any_done;
   }
   is_any_done = rename_files(station, record, result.files_problem) || is_any_done;
   if (!is_any_done) throw std::invalid_argument(repeated);
-  runs.deliver_waiting_runs();
-  if (calls_hook) result.problem = run_hook_and_record_result(*station->hook, record, *lock, runs);
+  runs.deliver_waiting();
+  if (calls_hook) result.problem = run_and_record_hook(*station->hook, record, *lock, runs);
   return result;
 }
 

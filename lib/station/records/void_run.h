@@ -21,8 +21,8 @@ struct VoidedRun {
 /// Voids a run, which then counts in no yield, trend or study. Its events record operator and
 /// reason. A voided golden run makes the golden unit due.
 ///
-/// At the station of the run its files are renamed (rename_files_of_voided_run()), and its hook is
-/// called (run_hook_and_record_result()). These steps are completed there for a run that was voided
+/// At the station of the run its files are renamed (rename_voided_files()), and its hook is
+/// called (run_and_record_hook()). These steps are completed there for a run that was voided
 /// before with records alone.
 ///
 /// @param runs     spool of the station, or records alone

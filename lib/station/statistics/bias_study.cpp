@@ -32,8 +32,8 @@ EstimateTest test_estimate(double value, double standard_error, double dof) {
   EstimateTest estimate{value, standard_error, dof, 0, 1, value, value};
   if (standard_error > 0) {
     estimate.t = value / standard_error;
-    estimate.p = compute_two_tailed_t_probability(estimate.t, dof);
-    const double half = compute_two_tailed_t_quantile(kLevel, dof) * standard_error;
+    estimate.p = compute_t_probability(estimate.t, dof);
+    const double half = compute_t_quantile(kLevel, dof) * standard_error;
     estimate.low = value - half;
     estimate.high = value + half;
   } else if (value != 0) {
@@ -69,19 +69,19 @@ Linearity fit_line(const std::vector<double>& references, const std::vector<doub
 
 }  // namespace
 
-bool EstimateTest::differs_significantly_from_zero() const { return p < kLevel; }
+bool EstimateTest::is_significant() const { return p < kLevel; }
 
 double Linearity::predict_bias_at(double reference) const {
   return intercept.value + slope.value * reference;
 }
 
-double Linearity::confidence_half_width_at(double reference) const {
+double Linearity::half_width_at(double reference) const {
   const double offset = reference - mean_reference;
-  return compute_two_tailed_t_quantile(kLevel, slope.dof) * residual_sd *
+  return compute_t_quantile(kLevel, slope.dof) * residual_sd *
          std::sqrt(1 / count + offset * offset / reference_squares);
 }
 
-BiasStudy analyze_bias_and_linearity(const std::vector<ReferenceValue>& values) {
+BiasStudy analyze_bias(const std::vector<ReferenceValue>& values) {
   if (values.empty()) throw std::invalid_argument("a bias study needs runs of reference units");
   std::map<std::pair<double, std::string>, std::vector<double>> by_unit;
   std::vector<double> references, differences;
@@ -119,27 +119,27 @@ void write_bias_plot(const std::filesystem::path& file, const std::string& title
                      const std::vector<ReferenceValue>& values, const BiasStudy& study) {
   std::string data, means, line;
   for (const auto& [unit, reference, value] : values) {
-    data += format_gnuplot_data_row({reference, value - reference});
+    data += format_data_row({reference, value - reference});
   }
   for (const UnitBias& unit : study.units) {
-    means += format_gnuplot_data_row({unit.reference, unit.bias.value});
+    means += format_data_row({unit.reference, unit.bias.value});
   }
   using namespace plot_colors;
   std::string commands = fmt::format(
       "{}{}{}set xlabel 'reference'\nset ylabel {} noenhanced\n"
       "set offsets graph 0.05, graph 0.05, graph 0.1, graph 0.1\n",
-      make_gnuplot_data_block("data", data), make_gnuplot_data_block("means", means),
-      make_common_gnuplot_settings(), quote_text_for_gnuplot(title + ", measured - reference"));
+      make_data_block("data", data), make_data_block("means", means), make_settings(),
+      quote_for_gnuplot(title + ", measured - reference"));
   if (study.linearity) {
     const double first = study.units.front().reference, last = study.units.back().reference;
     constexpr int parts = 50;
     for (int i = 0; i <= parts; ++i) {
       const double at = first + (last - first) * i / parts;
       const double bias = study.linearity->predict_bias_at(at),
-                   band = study.linearity->confidence_half_width_at(at);
-      line += format_gnuplot_data_row({at, bias, bias - band, bias + band});
+                   band = study.linearity->half_width_at(at);
+      line += format_data_row({at, bias, bias - band, bias + band});
     }
-    commands += make_gnuplot_data_block("line", line);
+    commands += make_data_block("line", line);
   }
   commands += fmt::format(
       "plot 0 with lines dashtype 3 linecolor rgb '{}' title 'no bias', "

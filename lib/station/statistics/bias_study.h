@@ -26,7 +26,7 @@ struct EstimateTest {
   double value = 0, standard_error = 0, dof = 0, t = 0, p = 1, low = 0, high = 0;
 
   /// Returns true if the value differs significantly from 0 (p < 0.05).
-  bool differs_significantly_from_zero() const;
+  bool is_significant() const;
 };
 
 /// Bias of the measured values of one reference unit. `mean` and `sd` are those of its values.
@@ -50,7 +50,7 @@ struct Linearity {
   double predict_bias_at(double reference) const;
   /// Returns half of the 95 % confidence band of the line at a reference x: t s sqrt(1 / n + (x -
   /// mean)^2 / S_xx).
-  double confidence_half_width_at(double reference) const;
+  double half_width_at(double reference) const;
 };
 
 /// Bias and linearity of a measurement system against reference units (AIAG MSA, 4th ed., chapter
@@ -69,7 +69,7 @@ struct BiasStudy {
 
 /// Computes bias and linearity. Throws std::invalid_argument if there is no value, or a unit with a
 /// single value; the message names what is missing.
-BiasStudy analyze_bias_and_linearity(const std::vector<ReferenceValue>& values);
+BiasStudy analyze_bias(const std::vector<ReferenceValue>& values);
 
 /// Plots the differences over the references, the mean of each unit, the line and its band, as .png
 /// or .svg. Throws InputError.

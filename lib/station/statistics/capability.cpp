@@ -33,11 +33,11 @@ CapabilityIndex compute_cpk_index(const ToleranceLimits& limits, double mean, do
   return {cpk, cpk - half, cpk + half};
 }
 
-std::optional<Capability> compute_process_capability(std::span<const double> values,
-                                                     const ToleranceLimits& limits) {
+std::optional<Capability> compute_capability(std::span<const double> values,
+                                             const ToleranceLimits& limits) {
   if (values.size() < 2 || (!limits.lower && !limits.upper)) return std::nullopt;
   const auto count = static_cast<double>(values.size());
-  const ControlChart chart = compute_control_chart(values);
+  const ControlChart chart = make_control_chart(values);
   double squares = 0;
   for (const double value : values) squares += (value - chart.mean) * (value - chart.mean);
   if (squares == 0) return std::nullopt;

@@ -50,8 +50,8 @@ struct Capability {
 
 /// Computes capability and performance. Returns std::nullopt for fewer than two values, for equal
 /// values, and without a limit.
-std::optional<Capability> compute_process_capability(std::span<const double> values,
-                                                     const ToleranceLimits& limits);
+std::optional<Capability> compute_capability(std::span<const double> values,
+                                             const ToleranceLimits& limits);
 
 /// Computes Cp = (U - L) / (6 s) with its interval. `tolerance` is U - L, and `dof` the degrees of
 /// freedom of `sd`.

@@ -39,7 +39,7 @@ bool has_values_beyond(Sigmas sigmas) {
 /// Returns true if the last `many` values increase or decrease throughout; if `turns`, if they
 /// alternate.
 template <std::size_t many, bool turns>
-bool has_values_in_steps(Sigmas sigmas) {
+bool has_steps(Sigmas sigmas) {
   if (sigmas.size() < many) return false;
   const Sigmas last = sigmas.last(many);
   for (const double first : {1.0, -1.0}) {
@@ -56,7 +56,7 @@ bool has_values_in_steps(Sigmas sigmas) {
 /// Returns true if all of the last `many` values are nearer to the mean than one sigma, or all
 /// farther.
 template <std::size_t many, bool nearer>
-bool are_all_values_near_or_far(Sigmas sigmas) {
+bool are_near_or_far(Sigmas sigmas) {
   if (sigmas.size() < many) return false;
   const Sigmas last = sigmas.last(many);
   return std::all_of(last.begin(), last.end(), [](double value) {
@@ -76,28 +76,24 @@ constexpr std::array kRules{
               has_values_beyond<8, 8, 0>},
     ChartRule{"nelson-1", kBeyond3, has_values_beyond<1, 1, 3>},
     ChartRule{"nelson-2", "9 in a row on one side of the mean", has_values_beyond<9, 9, 0>},
-    ChartRule{"nelson-3", "6 in a row up, or down", has_values_in_steps<6, false>},
-    ChartRule{"nelson-4", "14 in a row alternating up and down", has_values_in_steps<14, true>},
+    ChartRule{"nelson-3", "6 in a row up, or down", has_steps<6, false>},
+    ChartRule{"nelson-4", "14 in a row alternating up and down", has_steps<14, true>},
     ChartRule{"nelson-5", kBeyond2, has_values_beyond<2, 3, 2>},
     ChartRule{"nelson-6", kBeyond1, has_values_beyond<4, 5, 1>},
-    ChartRule{"nelson-7", "15 in a row within a sigma of the mean",
-              are_all_values_near_or_far<15, true>},
-    ChartRule{"nelson-8", "8 in a row more than a sigma from the mean",
-              are_all_values_near_or_far<8, false>}};
+    ChartRule{"nelson-7", "15 in a row within a sigma of the mean", are_near_or_far<15, true>},
+    ChartRule{"nelson-8", "8 in a row more than a sigma from the mean", are_near_or_far<8, false>}};
 
 constexpr const char* kEwma = "ewma";
 constexpr double kEwmaWeight = 0.3;
 
-bool is_rule_selected_by(const std::string& rule, const std::string& name) {
+bool is_selected_by(const std::string& rule, const std::string& name) {
   return rule == name || rule.substr(0, rule.rfind('-')) == name;
 }
 
 /// Throws for an unknown rule.
-void check_control_chart_rules(const std::vector<std::string>& names) {
+void check_rules(const std::vector<std::string>& names) {
   for (const std::string& name : names) {
-    const auto is_named = [&](const ChartRule& rule) {
-      return is_rule_selected_by(rule.name, name);
-    };
+    const auto is_named = [&](const ChartRule& rule) { return is_selected_by(rule.name, name); };
     if (name == kEwma || std::ranges::any_of(kRules, is_named)) continue;
     throw std::invalid_argument("there is no rule " + name +
                                 "; the rules are western-electric-1 to -4, nelson-1 to -8, ewma, "
@@ -107,7 +103,7 @@ void check_control_chart_rules(const std::vector<std::string>& names) {
 
 }  // namespace
 
-ControlChart compute_control_chart(std::span<const double> values) {
+ControlChart make_control_chart(std::span<const double> values) {
   constexpr double d2 = 1.128;
   ControlChart chart;
   if (values.empty()) return chart;
@@ -121,7 +117,7 @@ ControlChart compute_control_chart(std::span<const double> values) {
   return chart;
 }
 
-std::span<const ChartRule> list_control_chart_rules() { return kRules; }
+std::span<const ChartRule> list_chart_rules() { return kRules; }
 
 Ewma compute_ewma(std::span<const double> values, double target, double sigma, double weight,
                   double width) {
@@ -136,10 +132,10 @@ Ewma compute_ewma(std::span<const double> values, double target, double sigma, d
   return result;
 }
 
-std::vector<ChartAlarm> find_control_chart_alarms(std::span<const double> values,
-                                                  const std::vector<std::string>& rules) {
-  check_control_chart_rules(rules);
-  const ControlChart chart = compute_control_chart(values);
+std::vector<ChartAlarm> list_chart_alarms(std::span<const double> values,
+                                          const std::vector<std::string>& rules) {
+  check_rules(rules);
+  const ControlChart chart = make_control_chart(values);
   if (chart.sigma <= 0) return {};
   std::vector<double> sigmas;
   sigmas.reserve(values.size());
@@ -149,7 +145,7 @@ std::vector<ChartAlarm> find_control_chart_alarms(std::span<const double> values
   for (std::size_t i = 0; i < values.size(); ++i) {
     const auto is_selected = [&](const std::string& rule) {
       return std::ranges::any_of(
-          rules, [&](const std::string& name) { return is_rule_selected_by(rule, name); });
+          rules, [&](const std::string& name) { return is_selected_by(rule, name); });
     };
     for (const ChartRule& rule : kRules) {
       if (is_selected(rule.name) && rule.matches(Sigmas(sigmas).first(i + 1))) {
@@ -169,19 +165,19 @@ void write_trend_plot(const std::filesystem::path& file, const std::string& titl
                       std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
                       std::optional<double> gate) {
   const std::vector<double> values = extract_trend_values(points);
-  const ControlChart chart = compute_control_chart(values);
+  const ControlChart chart = make_control_chart(values);
   std::vector<bool> alarm(points.size());
   for (const ChartAlarm& each : alarms) alarm[each.index] = true;
   std::string data, alarm_points;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const std::string row = format_gnuplot_data_row({double(i + 1), values[i]});
+    const std::string row = format_data_row({double(i + 1), values[i]});
     data += row;
     if (alarm[i]) alarm_points += row;
   }
   using namespace plot_colors;
-  const auto number = [](double value) { return format_significant_digits(value, 9); };
-  std::string commands = make_gnuplot_data_block("data", data) + make_common_gnuplot_settings();
-  if (!alarm_points.empty()) commands += make_gnuplot_data_block("marked", alarm_points);
+  const auto number = [](double value) { return format_digits(value, 9); };
+  std::string commands = make_data_block("data", data) + make_settings();
+  if (!alarm_points.empty()) commands += make_data_block("marked", alarm_points);
   commands += fmt::format(
       "set xlabel 'runs, in the order of their end'\nset ylabel {} noenhanced\nset xrange {}\n"
       "set offsets 0, 0, graph 0.1, graph 0.1\n"
@@ -189,7 +185,7 @@ void write_trend_plot(const std::filesystem::path& file, const std::string& titl
       "{} with lines dashtype 2 linecolor rgb '{}' notitle, "
       "{} with lines linecolor rgb '{}' title 'mean', "
       "$data using 1:2 with linespoints pointtype 7 linecolor rgb '{}' title 'runs'",
-      quote_text_for_gnuplot(title), format_gnuplot_range(0.5, double(points.size()) + 0.5),
+      quote_for_gnuplot(title), format_gnuplot_range(0.5, double(points.size()) + 0.5),
       number(chart.upper), vermilion, number(chart.lower), vermilion, number(chart.mean), green,
       blue);
   if (gate) {

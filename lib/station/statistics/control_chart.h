@@ -22,7 +22,7 @@ struct ControlChart {
 
 /// Computes mean, sigma and limits of an individuals chart (ControlChart) of `values`, in
 /// chronological order. Sigma is 0 for fewer than two values, so that the limits equal the mean.
-ControlChart compute_control_chart(std::span<const double> values);
+ControlChart make_control_chart(std::span<const double> values);
 
 /// Pattern that is improbable for values with random variation only. It refers to a value and its
 /// predecessors, as distances from the mean in units of sigma. A value at the mean is on neither
@@ -35,7 +35,7 @@ struct ChartRule {
   /// Returns true if the pattern ends at the last value.
   bool (*matches)(std::span<const double> sigmas);
 };
-std::span<const ChartRule> list_control_chart_rules();
+std::span<const ChartRule> list_chart_rules();
 
 /// Exponentially weighted moving average (NIST/SEMATECH e-Handbook 6.3.2.4):
 ///
@@ -57,8 +57,8 @@ struct ChartAlarm {
 /// Finds alarms, in the order of the values, by rules of these names. "western-electric" and
 /// "nelson" select all of their rules, "ewma" the moving average with weight 0.3. Equal values have
 /// no alarms. Throws std::invalid_argument for an unknown name.
-std::vector<ChartAlarm> find_control_chart_alarms(std::span<const double> values,
-                                                  const std::vector<std::string>& rules);
+std::vector<ChartAlarm> list_chart_alarms(std::span<const double> values,
+                                          const std::vector<std::string>& rules);
 
 /// Plots values in their order with mean, limits, alarms and the gate, if any, as .png or .svg.
 /// Throws InputError as write_plot().

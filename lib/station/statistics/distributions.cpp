@@ -21,15 +21,15 @@ double compute_chi_square_quantile(double probability, double dof) {
   return quantile(boost::math::chi_squared(dof), probability);
 }
 
-double compute_f_upper_tail_probability(double x, double dof_above, double dof_below) {
+double compute_f_probability(double x, double dof_above, double dof_below) {
   return cdf(complement(boost::math::fisher_f(dof_above, dof_below), x));
 }
 
-double compute_two_tailed_t_probability(double t, double dof) {
+double compute_t_probability(double t, double dof) {
   return 2 * cdf(complement(boost::math::students_t(dof), std::abs(t)));
 }
 
-double compute_two_tailed_t_quantile(double both_tails, double dof) {
+double compute_t_quantile(double both_tails, double dof) {
   return quantile(complement(boost::math::students_t(dof), both_tails / 2));
 }
 

@@ -16,7 +16,7 @@
 namespace vlp {
 namespace {
 
-double sum_of_squared_deviations(const std::vector<double>& values, double center) {
+double sum_squares_about(const std::vector<double>& values, double center) {
   return std::accumulate(values.begin(), values.end(), 0.0, [&](double sum, double value) {
     return sum + (value - center) * (value - center);
   });
@@ -62,7 +62,7 @@ MeasurementStudy analyze_variance(const Cells& cells) {
     for (const auto& [station, values] : of_unit) {
       means.push_back(compute_mean(values));
       by_station[station].push_back(means.back());
-      study.error.sum_of_squares += sum_of_squared_deviations(values, means.back());
+      study.error.sum_of_squares += sum_squares_about(values, means.back());
     }
     unit_means.push_back(compute_mean(means));
     cell_means.insert(cell_means.end(), means.begin(), means.end());
@@ -73,8 +73,8 @@ MeasurementStudy analyze_variance(const Cells& cells) {
   study.mean = compute_mean(unit_means);
   const auto p = static_cast<double>(study.units), o = static_cast<double>(study.stations),
              r = static_cast<double>(study.repeats);
-  study.unit = {p - 1, o * r * sum_of_squared_deviations(unit_means, study.mean)};
-  study.station = {o - 1, p * r * sum_of_squared_deviations(station_means, study.mean)};
+  study.unit = {p - 1, o * r * sum_squares_about(unit_means, study.mean)};
+  study.station = {o - 1, p * r * sum_squares_about(station_means, study.mean)};
   study.error.dof = p * o * (r - 1);
   // From the cells, not as a difference of sums of all values.
   double interaction = 0;
@@ -94,14 +94,13 @@ double variance_component(double larger, double smaller, double count) {
 
 }  // namespace
 
-MeasurementStudy analyze_repeatability_and_reproducibility(const std::vector<StudyValue>& values) {
+MeasurementStudy analyze_study(const std::vector<StudyValue>& values) {
   constexpr double significant = 0.05;
   MeasurementStudy study = analyze_variance(group_cells(values));
   double error = study.error.mean_square(), interaction = study.interaction.mean_square();
   if (study.stations > 1) {
-    study.interaction_p = error > 0
-                              ? compute_f_upper_tail_probability(
-                                    interaction / error, study.interaction.dof, study.error.dof)
+    study.interaction_p = error > 0         ? compute_f_probability(interaction / error,
+                                                                    study.interaction.dof, study.error.dof)
                           : interaction > 0 ? 0
                                             : 1;
   }
@@ -127,13 +126,13 @@ MeasurementStudy analyze_repeatability_and_reproducibility(const std::vector<Stu
   return study;
 }
 
-std::optional<int> MeasurementStudy::compute_number_of_distinct_categories() const {
+std::optional<int> MeasurementStudy::count_distinct_categories() const {
   if (grr <= 0) return std::nullopt;
   constexpr double per_ratio = 1.41, max_categories = 1e6;
   return std::max(1, static_cast<int>(std::min(max_categories, per_ratio * unit_sd / grr)));
 }
 
-std::optional<double> MeasurementStudy::compute_precision_to_tolerance_percent(
+std::optional<double> MeasurementStudy::precision_to_tolerance_percent(
     const ToleranceLimits& limits) const {
   constexpr double percent = 100;
   if (limits.lower && limits.upper) {

@@ -50,11 +50,11 @@ struct MeasurementStudy {
   double grr = 0, unit_sd = 0, total = 0;
   /// Returns AIAG's ndc = 1.41 PV / GRR, truncated and at least 1; the manual requires 5. Returns
   /// std::nullopt if GRR is 0.
-  std::optional<int> compute_number_of_distinct_categories() const;
+  std::optional<int> count_distinct_categories() const;
   /// Returns the precision-to-tolerance ratio P/T in percent: 600 GRR / (U - L). With a single
   /// limit it is 300 GRR / (U - mean) or 300 GRR / (mean - L). Returns std::nullopt without a
   /// limit, and if the mean is at or beyond the single limit.
-  std::optional<double> compute_precision_to_tolerance_percent(const ToleranceLimits& limits) const;
+  std::optional<double> precision_to_tolerance_percent(const ToleranceLimits& limits) const;
 };
 
 /// Measured value of a unit on a station.
@@ -65,6 +65,6 @@ struct StudyValue {
 
 /// Analyzes a crossed study. Throws std::invalid_argument for fewer than two units or repeats, or
 /// if the number of repeats differs between units or stations; the message names what is missing.
-MeasurementStudy analyze_repeatability_and_reproducibility(const std::vector<StudyValue>& values);
+MeasurementStudy analyze_study(const std::vector<StudyValue>& values);
 
 }  // namespace vlp

@@ -10,15 +10,15 @@
 
 namespace vlp {
 
-std::vector<MetricKind> list_run_metric_kinds() {
-  auto kinds = list_unit_metric_kinds();
+std::vector<MetricKind> list_run_metrics() {
+  auto kinds = list_unit_metrics();
   const auto fix_metrics = list_metric_kinds({MetricSource::evaluation});
   kinds.insert(kinds.end(), fix_metrics.begin(), fix_metrics.end());
   return kinds;
 }
 
-MetricKind find_run_metric_kind(const std::string& name) {
-  const auto kinds = list_run_metric_kinds();
+MetricKind require_run_metric_kind(const std::string& name) {
+  const auto kinds = list_run_metrics();
   const auto kind = std::ranges::find(kinds, name, &MetricKind::name);
   if (kind != kinds.end()) return *kind;
   std::string names;
@@ -37,7 +37,7 @@ std::vector<TrendPoint> load_metric_values(Records& records, const std::string& 
   return keep_last_rows(std::move(points), last);
 }
 
-void check_values_are_of_one_station(const std::vector<TrendPoint>& points) {
+void check_one_station(const std::vector<TrendPoint>& points) {
   for (const TrendPoint& point : points) {
     if (point.station == points.front().station) continue;
     throw std::invalid_argument(
@@ -56,17 +56,17 @@ std::optional<double> find_gate_limit(const std::string& metric, const StationCo
     return std::nullopt;
   }
   const auto last = points.empty() ? std::nullopt : records.find_run_by_id(points.back().run);
-  const CheckedMetric* gate = last ? last->find_metric_by_name(metric) : nullptr;
+  const CheckedMetric* gate = last ? last->find_metric(metric) : nullptr;
   return gate != nullptr ? gate->limit : std::nullopt;
 }
 
-ToleranceLimits make_tolerance_limits(const MetricKind& kind, std::optional<double> gate) {
+ToleranceLimits make_specification_limits(const MetricKind& kind, std::optional<double> gate) {
   if (kind.direction == Direction::at_least) return {gate, std::nullopt};
   return {std::nullopt, gate};
 }
 
-std::vector<StudyValue> select_values_of_study_units(const std::vector<TrendPoint>& points,
-                                                     const std::vector<std::string>& units) {
+std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& points,
+                                            const std::vector<std::string>& units) {
   std::map<std::string, std::size_t> runs;
   for (const TrendPoint& point : points) ++runs[point.camera];
   std::string unknown;
@@ -86,8 +86,8 @@ std::vector<StudyValue> select_values_of_study_units(const std::vector<TrendPoin
   return values;
 }
 
-void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>& points,
-                                const std::vector<StudyValue>& values) {
+void check_no_shared_images(Records& records, const std::vector<TrendPoint>& points,
+                            const std::vector<StudyValue>& values) {
   std::map<std::string, std::vector<RunRecord>> runs_of_unit;
   for (const StudyValue& value : values) runs_of_unit[value.unit];
   for (const TrendPoint& point : points) {
@@ -96,8 +96,7 @@ void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>&
     auto run = records.find_run_by_id(point.run);
     if (!run) continue;
     for (const RunRecord& earlier : runs->second) {
-      if (!uses_images_of_earlier_run(*run, earlier) && !uses_images_of_earlier_run(earlier, *run))
-        continue;
+      if (!has_images_of(*run, earlier) && !has_images_of(earlier, *run)) continue;
       throw std::invalid_argument(
           fmt::format("runs {} and {} of camera {} have the same images, which is no repetition: "
                       "use new images, or void one of them",
@@ -107,13 +106,13 @@ void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>&
   }
 }
 
-std::vector<ReferenceValue> select_values_of_reference_units(
+std::vector<ReferenceValue> select_reference_values(
     const std::vector<TrendPoint>& points, const std::map<std::string, double>& references) {
   std::vector<std::string> units;
   units.reserve(references.size());
   for (const auto& [unit, reference] : references) units.push_back(unit);
   std::vector<ReferenceValue> values;
-  for (const auto& [unit, station, value] : select_values_of_study_units(points, units)) {
+  for (const auto& [unit, station, value] : select_study_values(points, units)) {
     values.push_back({unit, references.at(unit), value});
   }
   return values;
@@ -129,7 +128,7 @@ std::optional<double> RunCounts::compute_first_pass_yield() const {
   return static_cast<double>(cameras_passed_first) / static_cast<double>(cameras);
 }
 
-RunCounts count_runs_by_verdict(std::span<const RunSummary> runs) {
+RunCounts count_runs(std::span<const RunSummary> runs) {
   RunCounts counts;
   std::map<std::string, int> judged;
   for (const RunSummary& run : runs) {

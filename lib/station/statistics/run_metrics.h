@@ -20,11 +20,11 @@
 namespace vlp {
 
 /// Returns the kinds of all metrics that runs can have: those of units at a station
-/// (list_unit_metric_kinds()), followed by the errors of fixes, which sessions of archives have
+/// (list_unit_metrics()), followed by the errors of fixes, which sessions of archives have
 /// (archive_runs.h).
-std::vector<MetricKind> list_run_metric_kinds();
+std::vector<MetricKind> list_run_metrics();
 /// Returns the metric of this name. Throws std::invalid_argument that lists the valid names.
-MetricKind find_run_metric_kind(const std::string& name);
+MetricKind require_run_metric_kind(const std::string& name);
 
 /// Returns the values of a metric in judged runs, or in runs of the verdict that the filter
 /// selects.
@@ -33,26 +33,26 @@ std::vector<TrendPoint> load_metric_values(Records& records, const std::string& 
 
 /// Checks that all values are of one station. Throws std::invalid_argument otherwise; several
 /// stations are compared only on request.
-void check_values_are_of_one_station(const std::vector<TrendPoint>& points);
+void check_one_station(const std::vector<TrendPoint>& points);
 
 /// Returns the gate of a metric in the station's configuration or, without a station, in the last
 /// run. Returns std::nullopt if there is none.
 std::optional<double> find_gate_limit(const std::string& metric, const StationConfig* station,
                                       Records& records, const std::vector<TrendPoint>& points);
-ToleranceLimits make_tolerance_limits(const MetricKind& kind, std::optional<double> gate);
+ToleranceLimits make_specification_limits(const MetricKind& kind, std::optional<double> gate);
 
 /// Returns the values of the named units; those of all units with two runs or more if `units` is
 /// empty. Throws std::invalid_argument for units without a value.
-std::vector<StudyValue> select_values_of_study_units(const std::vector<TrendPoint>& points,
-                                                     const std::vector<std::string>& units);
+std::vector<StudyValue> select_study_values(const std::vector<TrendPoint>& points,
+                                            const std::vector<std::string>& units);
 /// Checks that no two runs of a unit use the same images, because such runs do not show
 /// repeatability. Throws std::invalid_argument that names two such runs. Ignores runs without
 /// images.
-void check_runs_share_no_images(Records& records, const std::vector<TrendPoint>& points,
-                                const std::vector<StudyValue>& values);
+void check_no_shared_images(Records& records, const std::vector<TrendPoint>& points,
+                            const std::vector<StudyValue>& values);
 /// Returns the values of reference units with their known values. Throws as
-/// select_values_of_study_units().
-std::vector<ReferenceValue> select_values_of_reference_units(
+/// select_study_values().
+std::vector<ReferenceValue> select_reference_values(
     const std::vector<TrendPoint>& points, const std::map<std::string, double>& references);
 
 /// Numbers of runs by result; voided runs are counted separately.
@@ -71,6 +71,6 @@ struct RunCounts {
 };
 
 /// Counts runs. `runs` are in chronological order.
-RunCounts count_runs_by_verdict(std::span<const RunSummary> runs);
+RunCounts count_runs(std::span<const RunSummary> runs);
 
 }  // namespace vlp

@@ -26,29 +26,29 @@ StepSources::StepSources(const std::vector<std::string>& sources,
   for (const StationStep step : kStationSteps) by_step_.emplace(step, default_source);
 }
 
-void StepSources::write_next_frame_of_step(const Unit& unit, WatchedRun& run) {
+void StepSources::write_next_frame(const Unit& unit, WatchedRun& run) {
   if (!last_.empty() && std::filesystem::exists(last_)) {
     const std::string name = last_.filename().string();
     const auto& images = unit.step_state(last_step_).images;
     const auto image = images.find(name);
     if (image == images.end()) return;
-    if (!image->second.is_image_used()) run.delete_rejected_image_file(last_step_, name);
+    if (!image->second.is_image_used()) run.delete_rejected(last_step_, name);
   }
   last_.clear();
-  const auto step = unit.first_incomplete_step();
+  const auto step = unit.first_incomplete();
   if (!step || !by_step_.contains(*step)) return;
-  last_ = by_step_.at(*step)->save_next_source_frame(run.step_folder(*step));
+  last_ = by_step_.at(*step)->save_next_frame(run.step_folder(*step));
   last_step_ = *step;
 }
 
-bool StepSources::has_step_source_ended(const Unit& unit) const {
-  const auto step = unit.first_incomplete_step();
+bool StepSources::has_video_ended(const Unit& unit) const {
+  const auto step = unit.first_incomplete();
   return step && last_.empty() && by_step_.contains(*step) &&
          by_step_.at(*step)->has_source_ended();
 }
 
-std::filesystem::path FrameSource::save_next_source_frame(const SharedFolder& folder) {
-  folder.check_folder_not_replaced();
+std::filesystem::path FrameSource::save_next_frame(const SharedFolder& folder) {
+  folder.check_not_replaced();
   const auto frame = ended_ ? std::nullopt : video_.read_next_frame();
   if (!frame) {
     if (video_.is_live_camera()) throw InputError(source_, "the camera gives no frame");
@@ -60,8 +60,8 @@ std::filesystem::path FrameSource::save_next_source_frame(const SharedFolder& fo
   std::string name;
   do {
     name = fmt::format("frame-{:06}.png", frames_++);
-  } while (folder.contains_folder_entry(name));
-  folder.replace_file_atomically(name, content);
+  } while (folder.contains(name));
+  folder.replace_file(name, content);
   return folder.folder_path() / name;
 }
 

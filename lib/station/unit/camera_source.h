@@ -27,7 +27,7 @@ class FrameSource {
   /// Writes the next frame, in gray, atomically as FOLDER/frame-000123.png, and returns its path;
   /// empty at the end of a video. Throws InputError if it cannot be written, if the path of the
   /// folder leads elsewhere by now, or if a camera delivers no frame.
-  std::filesystem::path save_next_source_frame(const SharedFolder& folder);
+  std::filesystem::path save_next_frame(const SharedFolder& folder);
 
   bool has_source_ended() const { return ended_; }
 
@@ -49,10 +49,10 @@ class StepSources {
   /// Writes the next frame to the folder of the current step, after the previous one was processed.
   /// The file of a rejected frame is removed, because a moving camera blurs images and a resting
   /// one repeats them. Rejected frames with a fault remain in the record. Throws InputError as
-  /// FrameSource::save_next_source_frame() and WatchedRun::delete_rejected_image_file().
-  void write_next_frame_of_step(const Unit& unit, WatchedRun& run);
+  /// FrameSource::save_next_frame() and WatchedRun::delete_rejected().
+  void write_next_frame(const Unit& unit, WatchedRun& run);
   /// Returns true if the current step's video has ended and all of its frames are processed.
-  bool has_step_source_ended(const Unit& unit) const;
+  bool has_video_ended(const Unit& unit) const;
 
  private:
   std::map<StationStep, std::shared_ptr<FrameSource>> by_step_;

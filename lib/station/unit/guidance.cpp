@@ -28,15 +28,14 @@ ViewCoverage compute_coverage(const Unit& unit) {
   IntrinsicsSolution poses{};
   for (const UnitImage* image : list_used_images(unit.step_state(StationStep::boards))) {
     poses.views.push_back(input.views.size());
-    input.views.push_back(
-        input.lattice.list_corners_with_board_positions(image->observation.board->detection));
-    const auto pose = estimate_board_view_pose(input.views.back(), nominal);
+    input.views.push_back(input.lattice.list_corners(image->observation.board->detection));
+    const auto pose = estimate_view_pose(input.views.back(), nominal);
     if (pose) poses.problem.poses.push_back(pose->camera_from_board);
   }
-  return compute_board_view_coverage(poses, input);
+  return measure_view_coverage(poses, input);
 }
 
-std::string describe_missing_angles(const YawCoverage::Height& height) {
+std::string describe_angles(const YawCoverage::Height& height) {
   std::string angles;
   for (std::size_t part = 0; part < height.covered_sectors.size(); ++part) {
     if (height.covered_sectors[part]) continue;
@@ -56,14 +55,14 @@ std::vector<std::string> draw_board_map(const Unit& unit) {
   for (int row = 0; row < ImageCoverage::kRows; ++row) {
     std::string line = "  |";
     for (int col = 0; col < ImageCoverage::kCols; ++col) {
-      const int corners = coverage.count_corners_in_cell(col, row);
+      const int corners = coverage.count_in_cell(col, row);
       line += corners == 0 ? " ." : corners < many ? " +" : " #";
     }
     lines.push_back(line + " |");
   }
   lines.push_back(edge);
   lines[1] += fmt::format("   {:.0f} % of the image have corners, {:.0f} % wanted",
-                          100 * coverage.covered_image_fraction(),
+                          100 * coverage.covered_fraction(),
                           100 * unit.station_config().completion.board_coverage);
   lines[3] += "   # many corners   + some   . none";
   const UnitStep& boards = unit.step_state(StationStep::boards);
@@ -76,24 +75,23 @@ std::vector<std::string> draw_board_map(const Unit& unit) {
 }
 
 /// Returns the covered angles of the rotation in place; empty before the lens is known.
-YawCoverage compute_yaw_coverage_of_unit(const Unit& unit) {
+YawCoverage compute_unit_coverage(const Unit& unit) {
   const auto& lens = unit.step_state(StationStep::boards).result;
   if (!lens || !lens->has_succeeded()) return {};
-  return compute_yaw_coverage(
-      collect_lamp_detections_of_used_images(unit.step_state(StationStep::rotation)),
-      unit.station_config(), lens->calibration);
+  return compute_yaw_coverage(list_used_detections(unit.step_state(StationStep::rotation)),
+                              unit.station_config(), lens->calibration);
 }
 
 /// Returns the heights of the rotation with covered and missing angles, as lines.
-std::vector<std::string> describe_rotation_coverage(const Unit& unit) {
+std::vector<std::string> describe_rotation(const Unit& unit) {
   std::vector<std::string> lines;
-  for (const YawCoverage::Height& height : compute_yaw_coverage_of_unit(unit).heights) {
+  for (const YawCoverage::Height& height : compute_unit_coverage(unit).heights) {
     std::string parts;
     for (const bool there : height.covered_sectors) parts += there ? '#' : '.';
     const double z_m = std::round(100 * height.z_m) / 100 + 0.0;  // without negative zero
     lines.push_back(fmt::format("  height {:5.2f} m  [{}]  {} captures over {:.0f} degrees", z_m,
                                 parts, height.captures, deg_from_rad(height.arc_rad)));
-    const std::string missing = describe_missing_angles(height);
+    const std::string missing = describe_angles(height);
     if (!missing.empty()) lines.push_back("    missing, degrees from the first:" + missing);
   }
   return lines;
@@ -103,7 +101,7 @@ std::vector<std::string> describe_rotation_coverage(const Unit& unit) {
 std::string describe_lamps(const Unit& unit, const UnitStep& step) {
   std::map<int, int> seen;
   for (const UnitImage* image : list_used_images(step)) {
-    for (const Detection& lamp : collect_identified_lamps(image->observation)) ++seen[lamp.lamp];
+    for (const Detection& lamp : list_identified(image->observation)) ++seen[lamp.lamp];
   }
   std::string there, missing;
   for (const Lamp& lamp : unit.station_config().lamps.lamps) {
@@ -115,7 +113,7 @@ std::string describe_lamps(const Unit& unit, const UnitStep& step) {
 
 }  // namespace
 
-std::string format_step_image_count(const Unit& unit, StationStep step) {
+std::string format_image_count(const Unit& unit, StationStep step) {
   const CompletionCriteria& completion = unit.station_config().completion;
   const std::array wanted{completion.board_views,
                           completion.rotation_captures * completion.rotation_heights,
@@ -124,24 +122,24 @@ std::string format_step_image_count(const Unit& unit, StationStep step) {
                      wanted[static_cast<std::size_t>(step)]);
 }
 
-std::vector<std::string> describe_step_progress(const Unit& unit, StationStep step) {
+std::vector<std::string> describe_progress(const Unit& unit, StationStep step) {
   if (step == StationStep::boards) return draw_board_map(unit);
   std::vector<std::string> lines;
-  if (step == StationStep::rotation) lines = describe_rotation_coverage(unit);
+  if (step == StationStep::rotation) lines = describe_rotation(unit);
   lines.push_back(describe_lamps(unit, unit.step_state(step)));
   return lines;
 }
 
-std::string describe_next_operator_action(const Unit& unit, StationStep step) {
+std::string describe_next_action(const Unit& unit, StationStep step) {
   const UnitStep& state = unit.step_state(step);
   if (state.result && !state.result->has_succeeded()) {
     return state.result->message + "; add images, or empty the folder of the step and repeat it";
   }
   switch (step) {
     case StationStep::boards:
-      return "show " + recommend_next_board_view(compute_coverage(unit));
+      return "show " + recommend_next_view(compute_coverage(unit));
     case StationStep::rotation: {
-      const YawCoverage turn = compute_yaw_coverage_of_unit(unit);
+      const YawCoverage turn = compute_unit_coverage(unit);
       if (!std::ranges::all_of(turn.heights, &YawCoverage::Height::is_complete)) {
         return "turn the camera in place to the next missing angle";
       }

@@ -41,8 +41,8 @@ struct FrameFix {
   Fix fix;
 };
 
-std::vector<FrameFix> locate_by_three_lamps(std::span<const Frame> frames, const LampMap& map,
-                                            const Calibration& calibration) {
+std::vector<FrameFix> locate_by_three(std::span<const Frame> frames, const LampMap& map,
+                                      const Calibration& calibration) {
   const Positioner positioner(map, calibration);
   std::vector<FrameFix> located;
   for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -58,7 +58,7 @@ std::vector<PositionError> compute_position_errors(std::span<const Frame> frames
                                                    const Calibration& calibration,
                                                    const CapturesTable& places) {
   std::vector<PositionError> errors;
-  for (const auto& [i, fix] : locate_by_three_lamps(frames, map, calibration)) {
+  for (const auto& [i, fix] : locate_by_three(frames, map, calibration)) {
     const auto entry = places.find(frames[i].image);
     if (entry == places.end() || entry->second.measured_point == MeasuredPoint::axis) continue;
     const Capture& place = entry->second;
@@ -75,7 +75,7 @@ constexpr Eigen::Index kFocalAndCenter = 4;
 
 /// Returns the calibration with additional variance for focal lengths and center, 5 % of the focal
 /// length. Distortion is common to the type of camera and is not freed.
-Calibration with_free_focal_length(Calibration calibration) {
+Calibration free_focal_length(Calibration calibration) {
   constexpr double relative_sd = 0.05;
   const double sd_px =
       relative_sd * (calibration.camera.intrinsics[0] + calibration.camera.intrinsics[1]) / 2;
@@ -83,19 +83,19 @@ Calibration with_free_focal_length(Calibration calibration) {
   if (!report) report.emplace();
   auto& covariance = report->covariance;
   if (!covariance) {
-    const Eigen::Index n = count_intrinsics_with_covariance(calibration.camera);
+    const Eigen::Index n = count_intrinsics(calibration.camera);
     covariance = Eigen::MatrixXd(Eigen::MatrixXd::Zero(n, n));
   }
   for (Eigen::Index i = 0; i < kFocalAndCenter; ++i) (*covariance)(i, i) += sd_px * sd_px;
   return calibration;
 }
 
-AdjustmentResult adjust_frames_without_positions(std::span<const Frame> frames, const LampMap& map,
-                                                 Calibration calibration) {
+AdjustmentResult adjust_frames(std::span<const Frame> frames, const LampMap& map,
+                               Calibration calibration) {
   AdjustmentInput input{{}, map, std::move(calibration)};
   for (Lamp& lamp : input.lamps.lamps) lamp.sd_m = 0;
   for (const Frame& frame : frames) input.captures.push_back({frame.image, frame.detections});
-  return run_bundle_adjustment(input);
+  return adjust_bundle(input);
 }
 
 /// Errors of the heights of fixes at known points.
@@ -111,7 +111,7 @@ std::optional<HeightErrors> compute_height_errors(const CapturesWithPositions& c
                                                   const Calibration& calibration) {
   constexpr std::size_t min_heights = 5;  // fewer make the median unreliable
   std::vector<double> errors_m, sds_m;
-  for (const auto& [i, fix] : locate_by_three_lamps(captures.frames, map, calibration)) {
+  for (const auto& [i, fix] : locate_by_three(captures.frames, map, calibration)) {
     const auto place = captures.positions.find(captures.frames[i].image);
     if (place == captures.positions.end() || !place->second.z_m) continue;
     errors_m.push_back(fix.state.pose.position_m.z() - *place->second.z_m);
@@ -122,7 +122,7 @@ std::optional<HeightErrors> compute_height_errors(const CapturesWithPositions& c
 }
 
 /// Returns the largest displacement of an image corner between two lenses.
-double max_corner_displacement_px(const Camera& a, const Camera& b) {
+double max_corner_shift_px(const Camera& a, const Camera& b) {
   double worst_px = 0;
   for (const double u : {0., double(a.imager_px[0])}) {
     for (const double v : {0., double(a.imager_px[1])}) {
@@ -138,15 +138,14 @@ double max_corner_displacement_px(const Camera& a, const Camera& b) {
 
 }  // namespace
 
-std::vector<std::string> describe_lamp_map_faults(std::span<const Frame> frames, const LampMap& map,
-                                                  const Calibration& calibration,
-                                                  double min_offset_px) {
+std::vector<std::string> list_lamp_map_faults(std::span<const Frame> frames, const LampMap& map,
+                                              const Calibration& calibration,
+                                              double min_offset_px) {
   std::vector<std::string> faults;
   if (frames.size() < kMinFrames) return faults;
   MapErrorOptions options;
   options.min_offset_px = min_offset_px;
-  for (const MapError& error :
-       detect_misplaced_or_swapped_lamps(frames, map, calibration, options).errors) {
+  for (const MapError& error : detect_map_errors(frames, map, calibration, options).errors) {
     if (!error.lamps.empty() || error.kind == MapErrorKind::mirrored) {
       faults.push_back(describe_map_error(error));
     }
@@ -154,38 +153,35 @@ std::vector<std::string> describe_lamp_map_faults(std::span<const Frame> frames,
   return faults;
 }
 
-std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, const LampMap& map) {
+std::vector<std::string> list_missing_lamps(std::span<const Frame> frames, const LampMap& map) {
   std::vector<std::string> faults;
   if (frames.size() < kMinFrames) return faults;
-  for (const MapError& error : find_undetected_lamps(frames, map))
+  for (const MapError& error : list_undetected_lamps(frames, map))
     faults.push_back(describe_map_error(error));
   return faults;
 }
 
-std::string describe_wrong_reference_positions(std::span<const Frame> frames, const LampMap& map,
-                                               const Calibration& calibration,
-                                               const CapturesTable& places) {
+std::string explain_wrong_positions(std::span<const Frame> frames, const LampMap& map,
+                                    const Calibration& calibration, const CapturesTable& places) {
   std::vector<CaptureError> errors;
   for (const PositionError& error : compute_position_errors(frames, map, calibration, places)) {
     errors.push_back({error.image, error.horizontal_m.norm(), error.frame});
   }
-  return describe_position_error_outliers(errors);
+  return describe_error_outliers(errors);
 }
 
-std::string describe_captures_with_large_residuals(std::span<const Frame> frames,
-                                                   const LampMap& map,
-                                                   const Calibration& calibration) {
+std::string explain_large_residuals(std::span<const Frame> frames, const LampMap& map,
+                                    const Calibration& calibration) {
   std::vector<CaptureError> residuals;
-  for (const auto& [i, fix] : locate_by_three_lamps(frames, map, calibration)) {
+  for (const auto& [i, fix] : locate_by_three(frames, map, calibration)) {
     residuals.push_back({frames[i].image, fix.residual_px, i});
   }
   return describe_residual_outliers(residuals);
 }
 
-std::optional<CommonOffset> find_common_position_offset(std::span<const Frame> frames,
-                                                        const LampMap& map,
-                                                        const Calibration& calibration,
-                                                        const CapturesTable& places) {
+std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
+                                               const Calibration& calibration,
+                                               const CapturesTable& places) {
   constexpr double max_ratio = 1.0 / 3;
   const std::vector<PositionError> errors =
       compute_position_errors(frames, map, calibration, places);
@@ -219,7 +215,7 @@ std::optional<CommonOffset> find_common_position_offset(std::span<const Frame> f
   return std::nullopt;
 }
 
-std::string describe_common_position_offset(const CommonOffset& offset) {
+std::string describe_common_offset(const CommonOffset& offset) {
   constexpr double millimeters = 1e3;
   const Eigen::Vector2d offset_mm = millimeters * offset.offset_m;
   // [STATION-19] `lamps have moved` | lamps or known points moved | repair the station
@@ -235,19 +231,17 @@ std::string describe_common_position_offset(const CommonOffset& offset) {
           : "the known points or the lamps have moved");
 }
 
-std::string describe_contradiction_to_calibrated_lens(std::span<const Frame> frames,
-                                                      const LampMap& map,
-                                                      const Calibration& calibration) {
+std::string explain_lens_contradiction(std::span<const Frame> frames, const LampMap& map,
+                                       const Calibration& calibration) {
   constexpr std::size_t min_captures =
       10;  // with fewer a free lens absorbs residuals of other faults
   if (frames.size() < min_captures) return "";
-  const AdjustmentResult constrained = adjust_frames_without_positions(frames, map, calibration);
-  const AdjustmentResult unconstrained =
-      adjust_frames_without_positions(frames, map, with_free_focal_length(calibration));
+  const AdjustmentResult constrained = adjust_frames(frames, map, calibration);
+  const AdjustmentResult unconstrained = adjust_frames(frames, map, free_focal_length(calibration));
   if (!constrained.has_succeeded() || !unconstrained.has_succeeded()) return "";
   constexpr double max_residual_ratio = 1.0 / 3, min_displacement_px = 1;
   if (unconstrained.residual_px >= max_residual_ratio * constrained.residual_px) return "";
-  if (max_corner_displacement_px(calibration.camera, unconstrained.camera) < min_displacement_px)
+  if (max_corner_shift_px(calibration.camera, unconstrained.camera) < min_displacement_px)
     return "";
   const auto words = [](const Camera& camera) {
     return fmt::format("a focal length of {:.1f} px and the center ({:.1f}, {:.1f})",
@@ -262,9 +256,9 @@ std::string describe_contradiction_to_calibrated_lens(std::span<const Frame> fra
       words(unconstrained.camera), words(calibration.camera));
 }
 
-std::string describe_focal_length_difference(const CapturesWithPositions& captures,
-                                             const CapturesWithPositions& reference,
-                                             const LampMap& map, const Calibration& calibration) {
+std::string explain_focal_difference(const CapturesWithPositions& captures,
+                                     const CapturesWithPositions& reference, const LampMap& map,
+                                     const Calibration& calibration) {
   const auto heights = compute_height_errors(captures, map, calibration);
   const auto reference_heights = compute_height_errors(reference, map, calibration);
   if (!heights || !reference_heights) return "";
@@ -278,15 +272,12 @@ std::string describe_focal_length_difference(const CapturesWithPositions& captur
       mm_per_m * heights->median_m, mm_per_m * reference_heights->median_m);
 }
 
-std::string describe_residual_increase_by_other_lens(std::span<const Frame> frames,
-                                                     std::span<const Frame> reference,
-                                                     const LampMap& map,
-                                                     const Calibration& calibration) {
-  const AdjustmentResult result = adjust_frames_without_positions(frames, map, calibration);
-  const AdjustmentResult reference_result =
-      adjust_frames_without_positions(reference, map, calibration);
+std::string explain_other_lens(std::span<const Frame> frames, std::span<const Frame> reference,
+                               const LampMap& map, const Calibration& calibration) {
+  const AdjustmentResult result = adjust_frames(frames, map, calibration);
+  const AdjustmentResult reference_result = adjust_frames(reference, map, calibration);
   if (!result.has_succeeded() || !reference_result.has_succeeded()) return "";
-  // The same ratio as in describe_contradiction_to_calibrated_lens(); 0.1 px is 0.3 mm at lamps 1.6
+  // The same ratio as in explain_lens_contradiction(); 0.1 px is 0.3 mm at lamps 1.6
   // m above a lens of 520 px.
   constexpr double min_ratio = 3, min_residual_px = 0.1;
   if (result.residual_px < std::max(min_residual_px, min_ratio * reference_result.residual_px))

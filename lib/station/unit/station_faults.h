@@ -20,26 +20,24 @@ namespace vlp {
 /// each. Requires three captures. Offsets below `min_offset_px` in the image are ignored. The
 /// default is large, so that small errors of the map do not excuse a camera that is being
 /// calibrated. It can be smaller for a known camera.
-std::vector<std::string> describe_lamp_map_faults(std::span<const Frame> frames, const LampMap& map,
-                                                  const Calibration& calibration,
-                                                  double min_offset_px = 2.5);
+std::vector<std::string> list_lamp_map_faults(std::span<const Frame> frames, const LampMap& map,
+                                              const Calibration& calibration,
+                                              double min_offset_px = 2.5);
 
 /// Returns a message for each lamp of the map that no frame contains, one line each. Empty if all
 /// lamps were detected, and for fewer than three frames.
-std::vector<std::string> describe_missing_lamps(std::span<const Frame> frames, const LampMap& map);
+std::vector<std::string> list_missing_lamps(std::span<const Frame> frames, const LampMap& map);
 
 /// Describes captures at other places than in their table, or by another camera
-/// (describe_position_error_outliers()), from fixes of three lamps or more. Returns an empty string
+/// (describe_error_outliers()), from fixes of three lamps or more. Returns an empty string
 /// if there are none.
-std::string describe_wrong_reference_positions(std::span<const Frame> frames, const LampMap& map,
-                                               const Calibration& calibration,
-                                               const CapturesTable& places);
+std::string explain_wrong_positions(std::span<const Frame> frames, const LampMap& map,
+                                    const Calibration& calibration, const CapturesTable& places);
 
 /// Describes captures whose residuals are outliers (describe_residual_outliers()), from fixes of
 /// three lamps or more. Returns an empty string if there are none.
-std::string describe_captures_with_large_residuals(std::span<const Frame> frames,
-                                                   const LampMap& map,
-                                                   const Calibration& calibration);
+std::string explain_large_residuals(std::span<const Frame> frames, const LampMap& map,
+                                    const Calibration& calibration);
 
 /// Common offset of all captures at known points.
 struct CommonOffset {
@@ -59,13 +57,12 @@ struct CommonOffset {
 /// Returns std::nullopt if there is none, and for fewer than five fixes. Returns std::nullopt, too,
 /// if the camera did not rotate between the captures, because the two frames cannot be separated
 /// then.
-std::optional<CommonOffset> find_common_position_offset(std::span<const Frame> frames,
-                                                        const LampMap& map,
-                                                        const Calibration& calibration,
-                                                        const CapturesTable& places);
+std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
+                                               const Calibration& calibration,
+                                               const CapturesTable& places);
 
 /// Describes an offset with its size and direction, and its possible reasons, in one line.
-std::string describe_common_position_offset(const CommonOffset& offset);
+std::string describe_common_offset(const CommonOffset& offset);
 
 /// Describes a contradiction between captures of lamps and the calibrated lens; empty if there is
 /// none.
@@ -76,9 +73,8 @@ std::string describe_common_position_offset(const CommonOffset& offset);
 /// third of the first, and a corner of the image moves by 1 px or more.
 ///
 /// Returns an empty string if an adjustment is undetermined, and for fewer than ten captures.
-std::string describe_contradiction_to_calibrated_lens(std::span<const Frame> frames,
-                                                      const LampMap& map,
-                                                      const Calibration& calibration);
+std::string explain_lens_contradiction(std::span<const Frame> frames, const LampMap& map,
+                                       const Calibration& calibration);
 
 /// Captures of lamps with their known heights.
 struct CapturesWithPositions {
@@ -92,17 +88,15 @@ struct CapturesWithPositions {
 ///
 /// Returns an empty string for a difference below 5 mm or three standard deviations of a height.
 /// Returns an empty string, too, if a set has fewer than five captures of known height.
-std::string describe_focal_length_difference(const CapturesWithPositions& captures,
-                                             const CapturesWithPositions& reference,
-                                             const LampMap& map, const Calibration& calibration);
+std::string explain_focal_difference(const CapturesWithPositions& captures,
+                                     const CapturesWithPositions& reference, const LampMap& map,
+                                     const Calibration& calibration);
 
 /// Describes in one line that the residuals of `frames` are larger than those of `reference`, by 3
 /// times and above 0.1 px. Each set is adjusted with its own tilt. Another center or distortion
 /// therefore raises the residuals, and a camera that moved or tilted does not. Returns an empty
 /// string without such a difference, and if an adjustment is undetermined.
-std::string describe_residual_increase_by_other_lens(std::span<const Frame> frames,
-                                                     std::span<const Frame> reference,
-                                                     const LampMap& map,
-                                                     const Calibration& calibration);
+std::string explain_other_lens(std::span<const Frame> frames, std::span<const Frame> reference,
+                               const LampMap& map, const Calibration& calibration);
 
 }  // namespace vlp

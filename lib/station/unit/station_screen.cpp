@@ -50,7 +50,7 @@ std::string describe_outcome(const UnitImage& image) {
 }
 
 /// Returns the step of a unit's run that did not finish, with which its causes begin
-/// (find_causes_of_failure()); std::nullopt if all did, and for golden units, whose steps are
+/// (list_failure_causes()); std::nullopt if all did, and for golden units, whose steps are
 /// optional. Metrics do not show it, because a failed step can have some.
 std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
   if (record.kind != "unit") return std::nullopt;
@@ -66,7 +66,7 @@ std::optional<StationStep> find_unfinished_step(const RunRecord& record) {
 
 /// Describes the gates without a value and the reason: "20 gates, because boards did not finish";
 /// their names if all steps finished. Returns an empty string if all gates have a value.
-std::string describe_unmeasured_gates(const RunRecord& record) {
+std::string describe_unmeasured(const RunRecord& record) {
   std::vector<std::string> names;
   for (const CheckedMetric& metric : record.metrics) {
     if (metric.limit && !metric.value) names.push_back(metric.name);
@@ -114,33 +114,32 @@ std::vector<ScreenLine> make_station_screen(const Unit& unit) {
   lines.push_back({fmt::format("{}   camera {}", unit.station_config().station, unit.camera_id())
                        .substr(0, kColumns),
                    ScreenLineStyle::heading});
-  const auto current = unit.first_incomplete_step();
+  const auto current = unit.first_incomplete();
   std::string steps;
   for (const StationStep step : kStationSteps) {
     const char* mark = unit.step_state(step).is_step_solved() ? "x" : step == current ? ">" : " ";
-    steps += fmt::format("[{}] {} {}   ", mark, station_step_name(step),
-                         format_step_image_count(unit, step));
+    steps +=
+        fmt::format("[{}] {} {}   ", mark, station_step_name(step), format_image_count(unit, step));
   }
   lines.push_back({steps.substr(0, kColumns)});
-  if (!unit.invalid_verdict_reason().empty()) {
-    add_wrapped_lines(lines, "Station", unit.invalid_verdict_reason() + "; no unit passes",
+  if (!unit.invalid_reason().empty()) {
+    add_wrapped_lines(lines, "Station", unit.invalid_reason() + "; no unit passes",
                       ScreenLineStyle::fail);
   }
   lines.push_back({""});
   if (!current) return lines;
   const UnitStep& state = unit.step_state(*current);
   lines.push_back({station_step_name(*current), ScreenLineStyle::heading});
-  for (std::string& line : describe_step_progress(unit, *current)) {
+  for (std::string& line : describe_progress(unit, *current)) {
     lines.push_back({line.substr(0, kColumns)});
   }
-  add_wrapped_lines(lines, "Next", describe_next_operator_action(unit, *current),
-                    ScreenLineStyle::plain);
+  add_wrapped_lines(lines, "Next", describe_next_action(unit, *current), ScreenLineStyle::plain);
   if (const auto image = state.images.find(state.last_image); image != state.images.end()) {
     add_wrapped_lines(
         lines, "Last", image->first + ": " + describe_outcome(image->second),
         image->second.is_image_used() ? ScreenLineStyle::pass : ScreenLineStyle::fail);
   }
-  for (const CheckedMetric& metric : unit.collect_unit_metrics()) {
+  for (const CheckedMetric& metric : unit.collect_metrics()) {
     // Blur of all current views: a few views can be misleading.
     const bool known = metric.value && metric.name != "blur_px";
     if (known && !metric.has_passed_gate())
@@ -156,28 +155,27 @@ std::vector<ScreenLine> make_station_screen(const Unit& unit) {
   return lines;
 }
 
-std::string describe_step_image_result(const Unit& unit, StationStep step,
-                                       const std::string& image) {
+std::string describe_step_image(const Unit& unit, StationStep step, const std::string& image) {
   const auto& images = unit.step_state(step).images;
   const auto found = images.find(image);
   const std::string outcome =
       found == images.end() ? "waits for the step before" : describe_outcome(found->second);
   return fmt::format("{} {}: {} ({})", station_step_name(step), image, outcome,
-                     format_step_image_count(unit, step));
+                     format_image_count(unit, step));
 }
 
-std::vector<ScreenLine> make_spool_notice_lines(const std::string& notice) {
-  return make_problem_lines("Records", escape_text_for_terminal(notice));
+std::vector<ScreenLine> make_notice_lines(const std::string& notice) {
+  return make_problem_lines("Records", escape_for_terminal(notice));
 }
 
-std::vector<ScreenLine> make_pending_hook_lines(const RunRecord& record) {
+std::vector<ScreenLine> make_hook_lines(const RunRecord& record) {
   const std::string problem = describe_pending_hook(record);
   return make_problem_lines("Hook",
                             problem.empty() ? "" : problem + "; 'vlp-station hook' runs it again");
 }
 
 std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
-  const std::string no_verdict = describe_why_verdict_is_void_or_edited(record);
+  const std::string no_verdict = explain_void_verdict(record);
   const bool passed = record.has_run_passed() && no_verdict.empty();
   const ScreenLineStyle style = passed ? ScreenLineStyle::pass : ScreenLineStyle::fail;
   std::vector<ScreenLine> lines{
@@ -185,7 +183,7 @@ std::vector<ScreenLine> make_verdict_screen(const RunRecord& record) {
   for (const CheckedMetric& metric : record.metrics) {
     if (metric.limit && metric.value) lines.push_back(make_gate_line(metric));
   }
-  if (const std::string gates = describe_unmeasured_gates(record); !gates.empty()) {
+  if (const std::string gates = describe_unmeasured(record); !gates.empty()) {
     add_wrapped_lines(lines, "Gates", "not measured: " + gates, ScreenLineStyle::plain);
   }
   std::istringstream causes(record.causes);

@@ -24,14 +24,13 @@ struct ScreenLine {
 std::vector<ScreenLine> make_station_screen(const Unit& unit);
 
 /// Returns the result of an image of a step, in one line.
-std::string describe_step_image_result(const Unit& unit, StationStep step,
-                                       const std::string& image);
+std::string describe_step_image(const Unit& unit, StationStep step, const std::string& image);
 
 /// Returns describe_pending_hook() with its remedy as lines; no line if it is empty.
-std::vector<ScreenLine> make_pending_hook_lines(const RunRecord& record);
+std::vector<ScreenLine> make_hook_lines(const RunRecord& record);
 
-/// Returns Spool::make_spool_notice_for_operator() as lines; no line if it is empty.
-std::vector<ScreenLine> make_spool_notice_lines(const std::string& notice);
+/// Returns Spool::make_operator_notice() as lines; no line if it is empty.
+std::vector<ScreenLine> make_notice_lines(const std::string& notice);
 
 /// Returns the screen of a verdict: gates with value and limit, causes, the primary one first, and
 /// PASS, FAIL or INVALID in large letters.

@@ -40,9 +40,9 @@ void add_nominal_differences(const Camera& type, LensResult& result) {
   result.metrics.push_back({"focal_percent", percent * focal});
   result.metrics.push_back(
       {"principal_point_px", std::hypot(found[2] - nominal[2], found[3] - nominal[3])});
-  const auto difference = compute_projection_difference(
-      result.lens.solution.fitted_lens(), Lens(type.lens_model, nominal), type.imager_px,
-      [](const Eigen::Vector2d&) { return 1.0; });
+  const auto difference =
+      compare_projections(result.lens.solution.fitted_lens(), Lens(type.lens_model, nominal),
+                          type.imager_px, [](const Eigen::Vector2d&) { return 1.0; });
   if (difference) result.metrics.push_back({"nominal_difference_px", difference->worst_px});
   const auto& report = result.calibration.intrinsics_report;
   const auto [x_m, y_m] =
@@ -68,11 +68,10 @@ std::string describe_positions_problem(std::size_t known, std::size_t captures, 
 
 /// Fails a solved step if some captures do not fit the result. They are rejected as outliers, but
 /// can be those of another camera. The operator has to repeat them.
-StepResult fail_if_inconsistent(const StationConfig& config, const std::vector<Frame>& frames,
-                                StepResult result) {
+StepResult check_consistency(const StationConfig& config, const std::vector<Frame>& frames,
+                             StepResult result) {
   if (!result.has_succeeded()) return result;
-  std::string fault =
-      describe_captures_with_large_residuals(frames, config.lamps, result.calibration);
+  std::string fault = explain_large_residuals(frames, config.lamps, result.calibration);
   if (!fault.empty()) result.set_step_failure(StepFailure::undetermined, std::move(fault));
   return result;
 }
@@ -116,8 +115,8 @@ void add_check_fractions(const LocateResult& located, const std::vector<Frame>& 
                     {"check_lamps_seen", ratio(seen.size(), map.lamps.size())}};
 }
 
-void add_position_error_metrics(const EvaluationInput& input, const Evaluation& evaluation,
-                                StepResult& result) {
+void add_error_metrics(const EvaluationInput& input, const Evaluation& evaluation,
+                       StepResult& result) {
   result.metrics.push_back({"check_mean_mm", kMillimetersPerMeter * evaluation.horizontal_m.mean});
   result.metrics.push_back({"check_worst_mm", kMillimetersPerMeter * evaluation.horizontal_m.max});
   Eigen::Vector2d sum_m = Eigen::Vector2d::Zero();
@@ -132,11 +131,11 @@ void add_position_error_metrics(const EvaluationInput& input, const Evaluation& 
 
 }  // namespace
 
-StepResult calibrate_lens_on_station(const StationConfig& config, const std::string& camera_id,
-                                     Observations seen) {
+StepResult run_station_lens(const StationConfig& config, const std::string& camera_id,
+                            Observations seen) {
   LensInput input{std::move(seen), config.board, {}, config.nominal_camera};
   input.camera.id = camera_id;
-  LensResult result = run_lens_calibration_step(std::move(input), {});
+  LensResult result = run_lens_step(std::move(input), {});
   result.skipped.clear();  // the station reports images itself
   if (result.failure == StepFailure::wrong_board)
     return add_step_name("wrong board", std::move(result));
@@ -149,22 +148,18 @@ StepResult calibrate_lens_on_station(const StationConfig& config, const std::str
   return result;
 }
 
-StepResult calibrate_rotation_on_station(const StationConfig& config,
-                                         const Calibration& calibration,
-                                         const std::vector<Frame>& frames) {
-  return add_step_name("the rotation in place",
-                       fail_if_inconsistent(config, frames,
-                                            run_rotation_calibration_step(
-                                                make_lamp_captures(config, calibration, frames),
-                                                RotationMethod::axis, {})));
+StepResult run_station_rotation(const StationConfig& config, const Calibration& calibration,
+                                const std::vector<Frame>& frames) {
+  return add_step_name(
+      "the rotation in place",
+      check_consistency(config, frames,
+                        run_rotation_step(make_lamp_captures(config, calibration, frames),
+                                          RotationMethod::axis, {})));
 }
 
-StepResult calibrate_dispersion_on_station(const StationConfig& config,
-                                           const Calibration& calibration,
-                                           const std::vector<Frame>& frames,
-                                           const CapturesTable& places) {
-  const KnownPositions known =
-      collect_captures_at_known_positions(frames, places, config.dispersion_position_m);
+StepResult run_station_dispersion(const StationConfig& config, const Calibration& calibration,
+                                  const std::vector<Frame>& frames, const CapturesTable& places) {
+  const KnownPositions known = collect_known_captures(frames, places, config.dispersion_position_m);
   std::string problem = describe_positions_problem(known.captures.size(), frames.size(),
                                                    config.completion.dispersion_captures);
   if (!problem.empty()) {
@@ -174,16 +169,13 @@ StepResult calibrate_dispersion_on_station(const StationConfig& config,
   }
   return add_step_name(
       "the fixes at the station",
-      fail_if_inconsistent(
-          config, frames,
-          run_dispersion_calibration_step(make_lamp_captures(config, calibration, frames), known,
-                                          DispersionMethod::camera, DispersionCircle::mean, {})));
+      check_consistency(config, frames,
+                        run_dispersion_step(make_lamp_captures(config, calibration, frames), known,
+                                            DispersionMethod::camera, DispersionCircle::mean, {})));
 }
 
-StepResult check_position_accuracy_on_station(const StationConfig& config,
-                                              const Calibration& calibration,
-                                              const std::vector<Frame>& frames,
-                                              const CapturesTable& places) {
+StepResult run_station_check(const StationConfig& config, const Calibration& calibration,
+                             const std::vector<Frame>& frames, const CapturesTable& places) {
   StepResult result;
   KnownPoints known = select_known_points(frames, places);
   std::string problem = describe_positions_problem(known.frames.size(), frames.size(),
@@ -194,7 +186,7 @@ StepResult check_position_accuracy_on_station(const StationConfig& config,
   }
   result.calibration = calibration;
   const LocateResult located =
-      locate_camera_from_detections({known.frames, config.lamps, calibration, places});
+      locate_from_detections({known.frames, config.lamps, calibration, places});
   add_check_fractions(located, known.frames, config.lamps, result);
   result.rejected_lamps = located.rejected_lamps;
   result.warnings = located.warnings;
@@ -204,11 +196,9 @@ StepResult check_position_accuracy_on_station(const StationConfig& config,
   input.fixes = {"check", located.rows};
   input.truth = {"check", std::move(known.truth)};
   input.reference_point_radius_m = compute_same_position_radius_m(calibration);
-  const EvaluateResult errors = evaluate_fixes_against_truth(input, {});
-  result.drawing = [input, lamps = config.lamps] {
-    return draw_fix_errors_on_floor_plan(input, lamps);
-  };
-  add_position_error_metrics(input, errors.evaluation, result);
+  const EvaluateResult errors = evaluate_with_truth(input, {});
+  result.drawing = [input, lamps = config.lamps] { return draw_floor_plan(input, lamps); };
+  add_error_metrics(input, errors.evaluation, result);
   if (const auto& typical = located.summary.statistics; typical && typical->median_residual_px) {
     result.metrics.push_back({"check_residual_px", *typical->median_residual_px});
   }

@@ -22,13 +22,13 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Returns UnitImage::level for an image.
-Eigen::Matrix3d find_level_rotation(const LevelRotations& levels, const std::string& image) {
+Eigen::Matrix3d get_level_rotation(const LevelRotations& levels, const std::string& image) {
   const auto level = levels.find(image);
   return level == levels.end() ? Eigen::Matrix3d::Zero().eval() : level->second.value();
 }
 
 /// Returns the use of the images of a step.
-ImageUse find_image_use(StationStep step) {
+ImageUse get_image_use(StationStep step) {
   if (step == StationStep::boards) return ImageUse::boards;
   return step == StationStep::rotation ? ImageUse::rotation : ImageUse::known_positions;
 }
@@ -42,69 +42,69 @@ Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion pr
       threads_(threads),
       boards_(config.board, config.frontend, config.nominal_camera.imager_px) {}
 
-void Unit::reprocess_step_with_changed_tables(StationStep step) {
+void Unit::reprocess_step(StationStep step) {
   if (step != StationStep::dispersion && step != StationStep::check) return;
-  reprocess_images_with_changed_inclination(step);
+  reprocess_inclined(step);
   mutable_step_state(step).result.reset();
   reset_steps_after(step);
 }
 
 /// Processes the images again whose inclination changed. They are not counted again.
-void Unit::reprocess_images_with_changed_inclination(StationStep step) {
-  const LevelRotations levels = find_level_rotations_of_images(step);
+void Unit::reprocess_inclined(StationStep step) {
+  const LevelRotations levels = list_level_rotations(step);
   UnitStep& state = mutable_step_state(step);
   std::vector<fs::path> again;
   for (const auto& [name, image] : state.images) {
-    if (!image.discarded && find_level_rotation(levels, name) != image.level)
+    if (!image.discarded && get_level_rotation(levels, name) != image.level)
       again.push_back(image.observation.file);
   }
-  if (again.empty() || !calibration_before_step(step)) return;
+  if (again.empty() || !calibration_before(step)) return;
   const int refused = state.num_rejected_in_batch;
   const bool used = state.is_any_used_in_batch;
-  process_image_files(step, again);
+  process_files(step, again);
   state.num_rejected_in_batch = refused;
   state.is_any_used_in_batch = used;
 }
 
-void Unit::solve_completed_station_steps(bool all_in) {
-  solve_steps_in_order(all_in);
-  row_time_ = check_row_time_against_lamps(list_lamp_image_observations(*this), config_.lamps,
-                                           make_configured_row_time(config_));
+void Unit::solve_completed(bool all_in) {
+  solve_in_order(all_in);
+  row_time_ =
+      check_row_time(list_lamp_observations(*this), config_.lamps, make_given_row_time(config_));
 }
 
-void Unit::solve_steps_in_order(bool all_in) {
+void Unit::solve_in_order(bool all_in) {
   for (const StationStep step : kStationSteps) {
     UnitStep& state = mutable_step_state(step);
-    if (!calibration_before_step(step)) return;
+    if (!calibration_before(step)) return;
     const auto waiting = std::exchange(state.pending_images, {});
     if (!waiting.empty()) {
-      process_image_files(step, waiting);
-      update_consecutive_rejection_count(step);
+      process_files(step, waiting);
+      count_rejections(step);
     }
     if (state.result && (state.result->has_succeeded() || !all_in)) continue;
     state.sufficient = has_sufficient_images(step);
     if (!state.sufficient && !all_in) return;
-    state.result = solve_station_step(step, all_in);
+    state.result = compute_step_result(step, all_in);
     state.plot = state.result->drawing ? render_plot_async(state.result->drawing) : StepPlot{};
     if (!state.result->has_succeeded()) return;
   }
 }
 
-std::optional<Calibration> Unit::calibration_before_step(StationStep step) const {
+std::optional<Calibration> Unit::calibration_before(StationStep step) const {
   if (step == StationStep::boards) return Calibration{};
   const UnitStep& before = steps_[step_index(step) - 1];
   if (!before.result || !before.result->has_succeeded()) return std::nullopt;
   return before.result->calibration;
 }
 
-std::optional<StationStep> Unit::first_incomplete_step() const {
+std::optional<StationStep> Unit::first_incomplete() const {
   for (const StationStep step : kStationSteps) {
     if (!this->step_state(step).is_step_solved()) return step;
   }
   return std::nullopt;
 }
 
-std::vector<ReportPlot> Unit::collect_report_plots() const {
+std::vector<ReportPlot> Unit::collect_plots() const {
   std::vector<ReportPlot> pictures;
   for (const UnitStep& state : steps_) {
     if (!state.result || !state.plot.valid()) continue;
@@ -114,16 +114,15 @@ std::vector<ReportPlot> Unit::collect_report_plots() const {
 }
 
 bool Unit::can_no_longer_pass() const {
-  const auto step = first_incomplete_step();
+  const auto step = first_incomplete();
   if (!step) return false;
   const UnitStep& state = this->step_state(*step);
   if (state.num_consecutive_rejections >= config_.max_consecutive_rejections) return true;
   const bool stuck = state.sufficient && state.result && !state.result->has_succeeded();
   if (!stuck || *step == StationStep::boards) return false;
-  const auto frames = collect_lamp_detections_of_used_images(state);
-  return !describe_lamp_map_faults(frames, config_.lamps, *calibration_before_step(*step))
-              .empty() ||
-         !describe_missing_lamps(frames, config_.lamps).empty();
+  const auto frames = list_used_detections(state);
+  return !list_lamp_map_faults(frames, config_.lamps, *calibration_before(*step)).empty() ||
+         !list_missing_lamps(frames, config_.lamps).empty();
 }
 
 void Unit::add_step_images(StationStep step, const std::vector<fs::path>& files,
@@ -131,16 +130,16 @@ void Unit::add_step_images(StationStep step, const std::vector<fs::path>& files,
   UnitStep& state = mutable_step_state(step);
   if (files.empty()) return;
   state.folder = files.front().parent_path();
-  if (!calibration_before_step(step)) {
+  if (!calibration_before(step)) {
     state.pending_images.insert(state.pending_images.end(), files.begin(), files.end());
     return;
   }
-  process_image_files(step, files);
-  if (!more_to_come) update_consecutive_rejection_count(step);
+  process_files(step, files);
+  if (!more_to_come) count_rejections(step);
 }
 
 /// Updates the number of consecutive rejections after a batch.
-void Unit::update_consecutive_rejection_count(StationStep step) {
+void Unit::count_rejections(StationStep step) {
   UnitStep& state = mutable_step_state(step);
   const int refused = std::exchange(state.num_rejected_in_batch, 0);
   const bool used = std::exchange(state.is_any_used_in_batch, false);
@@ -149,39 +148,37 @@ void Unit::update_consecutive_rejection_count(StationStep step) {
 
 /// Returns the rotations of captures of known inclination. Those of the rotation step have none,
 /// because its axis is vertical.
-LevelRotations Unit::find_level_rotations_of_images(StationStep step) const {
+LevelRotations Unit::list_level_rotations(StationStep step) const {
   if (step != StationStep::dispersion && step != StationStep::check) return {};
-  const auto calibration = calibration_before_step(step);
+  const auto calibration = calibration_before(step);
   if (!calibration) return {};
   try {
-    return compute_level_rotations_of_images(
-        read_captures_csv_of_folder(this->step_state(step).folder), *calibration, 0);
+    return compute_level_rotations(read_folder_captures(this->step_state(step).folder),
+                                   *calibration, 0);
   } catch (const InputError&) {  // reported by the step
     return {};
   }
 }
 
-void Unit::process_image_files(StationStep step, const std::vector<fs::path>& files) {
+void Unit::process_files(StationStep step, const std::vector<fs::path>& files) {
   std::vector<UnitImage> images(files.size());
-  const LevelRotations levels = find_level_rotations_of_images(step);
+  const LevelRotations levels = list_level_rotations(step);
   std::optional<LampIntake> lamps;
   if (step != StationStep::boards) {
-    lamps.emplace(
-        LightDetector(config_.lamps, make_detector_camera(*calibration_before_step(step))),
-        find_image_use(step), config_.frontend, config_.nominal_camera.imager_px, levels);
+    lamps.emplace(LightDetector(config_.lamps, make_detector_camera(*calibration_before(step))),
+                  get_image_use(step), config_.frontend, config_.nominal_camera.imager_px, levels);
   }
-  process_images_in_parallel(files.size(), threads_, [&](std::size_t i) {
+  process_images(files.size(), threads_, [&](std::size_t i) {
     images[i] = observe_unit_image(files[i], [&](const SourceImage& source) {
-      return lamps ? lamps->detect_lamps_in_image(source) : boards_.detect_board_in_image(source);
+      return lamps ? lamps->detect_lamps_in_image(source) : boards_.detect_board(source);
     });
-    images[i].level = find_level_rotation(levels, images[i].observation.image_file_name());
+    images[i].level = get_level_rotation(levels, images[i].observation.image_file_name());
   });
   for (UnitImage& image : images) {
     const ImageUser owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : ImageUser();
     if (!owner.has_no_run()) {
-      image.observation.set_image_rejection(
-          RejectionReason::used_elsewhere,
-          "already of " + describe_run_using_image(owner, config_.file));
+      image.observation.reject(RejectionReason::used_elsewhere,
+                               "already of " + describe_image_user(owner, config_.file));
     }
     mutable_step_state(step).last_image = image.observation.image_file_name();
     add_image_to_step(step, std::move(image));
@@ -191,8 +188,8 @@ void Unit::process_image_files(StationStep step, const std::vector<fs::path>& fi
 void Unit::add_image_to_step(StationStep step, UnitImage image) {
   UnitStep& state = mutable_step_state(step);
   const std::string name = image.observation.image_file_name();
-  remove_image_from_step(step, name);  // it was overwritten
-  if (image.is_image_used()) reject_image_if_redundant(step, image);
+  remove_image(step, name);  // it was overwritten
+  if (image.is_image_used()) reject_if_redundant(step, image);
   const bool used = image.is_image_used();
   const bool fault = !used && !image.is_image_redundant() && !state.is_step_solved();
   state.num_rejected_in_batch += fault ? 1 : 0;
@@ -205,27 +202,26 @@ void Unit::add_image_to_step(StationStep step, UnitImage image) {
 
 /// Rejects an image without a fault that is redundant. It has the content of an image of any step,
 /// shows the same as an image of this step, or the step is complete.
-void Unit::reject_image_if_redundant(StationStep step, UnitImage& image) const {
+void Unit::reject_if_redundant(StationStep step, UnitImage& image) const {
   for (const UnitStep& any : steps_) {
     for (const UnitImage* other : list_used_images(any)) {
       if (image.sha256.empty() || other->sha256 != image.sha256) continue;
-      return image.observation.set_image_rejection(
+      return image.observation.reject(
           RejectionReason::same_image,
           "is the same image as " + other->observation.image_file_name());
     }
   }
-  Selection selection(find_image_use(step), config_.frontend);
+  Selection selection(get_image_use(step), config_.frontend);
   for (const UnitImage* other : list_used_images(this->step_state(step)))
     selection.add_kept_image(other->observation);
-  selection.add_image_or_reject_as_repeated(image.observation);
+  selection.add_or_reject(image.observation);
   if (!image.is_image_used() || !this->step_state(step).is_step_solved()) return;
-  image.observation.set_image_rejection(RejectionReason::not_needed,
-                                        "not needed: the step has enough");
+  image.observation.reject(RejectionReason::not_needed, "not needed: the step has enough");
 }
 
 /// Removes an image and the results that depend on it. Images that were redundant because of it are
 /// used again.
-void Unit::remove_image_from_step(StationStep step, const std::string& name) {
+void Unit::remove_image(StationStep step, const std::string& name) {
   UnitStep& state = mutable_step_state(step);
   const auto image = state.images.find(name);
   if (image == state.images.end()) return;
@@ -245,12 +241,12 @@ void Unit::remove_image_from_step(StationStep step, const std::string& name) {
   }
 }
 
-void Unit::remove_deleted_image(StationStep step, const std::string& name) {
+void Unit::remove_deleted(StationStep step, const std::string& name) {
   UnitStep& state = mutable_step_state(step);
   std::erase_if(state.pending_images,
                 [&](const fs::path& file) { return file.filename() == name; });
   if (state.images.contains(name)) state.num_consecutive_rejections = 0;
-  remove_image_from_step(step, name);
+  remove_image(step, name);
 }
 
 void Unit::mark_image_discarded(StationStep step, const std::string& name) {
@@ -285,11 +281,10 @@ bool Unit::has_sufficient_images(StationStep step) const {
   switch (step) {
     case StationStep::boards:
       return state.count_used_images() >= completion.board_views &&
-             compute_board_coverage(state, config_.nominal_camera.imager_px)
-                     .covered_image_fraction() >= completion.board_coverage;
+             compute_board_coverage(state, config_.nominal_camera.imager_px).covered_fraction() >=
+                 completion.board_coverage;
     case StationStep::rotation:
-      return compute_yaw_coverage(collect_lamp_detections_of_used_images(state), config_,
-                                  *calibration_before_step(step))
+      return compute_yaw_coverage(list_used_detections(state), config_, *calibration_before(step))
           .sufficient;
     case StationStep::dispersion:
       return state.count_used_images() >= completion.dispersion_captures;
@@ -299,32 +294,29 @@ bool Unit::has_sufficient_images(StationStep step) const {
   return false;
 }
 
-StepResult Unit::solve_station_step(StationStep step, bool all_in) const {
+StepResult Unit::compute_step_result(StationStep step, bool all_in) const {
   const UnitStep& state = this->step_state(step);
   StepResult result;
   if (state.count_used_images() == 0) {
     result.set_step_failure(StepFailure::undetermined, "no image can be used");
     return result;
   }
-  const Calibration before = *calibration_before_step(step);
+  const Calibration before = *calibration_before(step);
   try {
     switch (step) {
       case StationStep::boards:
-        result = calibrate_lens_on_station(config_, camera_id_, collect_step_observations(state));
+        result = run_station_lens(config_, camera_id_, list_observations(state));
         break;
       case StationStep::rotation:
-        result = calibrate_rotation_on_station(config_, before,
-                                               collect_lamp_detections_of_used_images(state));
+        result = run_station_rotation(config_, before, list_used_detections(state));
         break;
       case StationStep::dispersion:
-        result = calibrate_dispersion_on_station(config_, before,
-                                                 collect_lamp_detections_of_used_images(state),
-                                                 read_captures_with_truth(state.folder));
+        result = run_station_dispersion(config_, before, list_used_detections(state),
+                                        read_captures_with_truth(state.folder));
         break;
       case StationStep::check:
-        return check_position_accuracy_on_station(config_, before,
-                                                  collect_lamp_detections_of_used_images(state),
-                                                  read_captures_with_truth(state.folder));
+        return run_station_check(config_, before, list_used_detections(state),
+                                 read_captures_with_truth(state.folder));
     }
   } catch (const InputError& error) {  // the table may be incomplete
     if (all_in) throw;
@@ -334,13 +326,13 @@ StepResult Unit::solve_station_step(StationStep step, bool all_in) const {
   if (result.has_succeeded()) {
     HistoryEntry& entry = result.calibration.history.back();
     const std::string part = entry.part;
-    entry = make_step_history_entry(step);
+    entry = make_step_entry(step);
     entry.part = part;
   }
   return result;
 }
 
-HistoryEntry Unit::make_step_history_entry(StationStep step) const {
+HistoryEntry Unit::make_step_entry(StationStep step) const {
   std::string digests;
   for (const auto& [name, image] : this->step_state(step).images) {
     if (image.is_image_used()) digests += fmt::format("{}  {}\n", image.sha256, name);
@@ -349,20 +341,19 @@ HistoryEntry Unit::make_step_history_entry(StationStep step) const {
           program_.program,
           program_.version,
           "",
-          {{"station", config_.sha256}, {station_step_name(step), compute_text_sha256(digests)}}};
+          {{"station", config_.sha256}, {station_step_name(step), hash_text(digests)}}};
 }
 
-std::vector<Observation> list_lamp_image_observations(const Unit& unit) {
+std::vector<Observation> list_lamp_observations(const Unit& unit) {
   std::vector<Observation> images;
   for (const StationStep step : kStationSteps) {
     if (step == StationStep::boards) continue;
-    std::ranges::move(collect_step_observations(unit.step_state(step)).images,
-                      std::back_inserter(images));
+    std::ranges::move(list_observations(unit.step_state(step)).images, std::back_inserter(images));
   }
   return images;
 }
 
-GivenRowTime make_configured_row_time(const StationConfig& config) {
+GivenRowTime make_given_row_time(const StationConfig& config) {
   return {config.nominal_camera.row_time_s.value(), config.type_file};
 }
 
@@ -374,7 +365,7 @@ std::optional<Calibration> Unit::latest_calibration() const {
   return last;
 }
 
-std::vector<CheckedMetric> Unit::collect_unit_metrics() const {
+std::vector<CheckedMetric> Unit::collect_metrics() const {
   std::vector<Metric> values;
   if (const auto blur_px = compute_median_blur_px(step_state(StationStep::boards))) {
     values.push_back({"blur_px", *blur_px});
@@ -385,7 +376,7 @@ std::vector<CheckedMetric> Unit::collect_unit_metrics() const {
   }
   const auto row_time = make_row_time_metrics(row_time_);
   values.insert(values.end(), row_time.begin(), row_time.end());
-  return check_all_metrics_against_gates(config_.gates, values, list_unit_metric_kinds());
+  return check_against_gates(config_.gates, values, list_unit_metrics());
 }
 
 }  // namespace vlp

@@ -44,38 +44,38 @@ class Unit {
                        bool more_to_come = false);
   /// Removes an image whose file was deleted. Images that are redundant only because of it are used
   /// instead.
-  void remove_deleted_image(StationStep step, const std::string& name);
+  void remove_deleted(StationStep step, const std::string& name);
   /// Marks the file of a rejected image as deleted. The rejection remains, but does not count as
   /// consecutive, because a moving camera blurs images. A redundant image is removed.
   void mark_image_discarded(StationStep step, const std::string& name);
   /// Handles a change of the step's captures.csv or truth.csv.
-  void reprocess_step_with_changed_tables(StationStep step);
+  void reprocess_step(StationStep step);
   /// Solves the steps that are complete. If `all_in`, no more images arrive, and incomplete steps
   /// are solved, too. An unreadable captures.csv then throws InputError; otherwise it is the step's
   /// problem.
-  void solve_completed_station_steps(bool all_in);
+  void solve_completed(bool all_in);
   /// Sets the function that finds another camera's run by the SHA-256 of an image. Such images are
   /// rejected.
-  void set_lookup_of_run_using_image(std::function<ImageUser(const std::string& sha256)> owner) {
+  void set_image_lookup(std::function<ImageUser(const std::string& sha256)> owner) {
     owner_ = std::move(owner);
   }
   /// Ends an incomplete unit: no more images arrive. `reason` is human-readable, as "the operator
   /// ended the run".
-  void end_unit_before_completion(std::string reason) { ended_ = std::move(reason); }
-  /// The reason given to end_unit_before_completion(); empty if the unit was not ended early.
+  void end_early(std::string reason) { ended_ = std::move(reason); }
+  /// The reason given to end_early(); empty if the unit was not ended early.
   const std::string& early_end_reason() const { return ended_; }
 
   /// Makes the verdict of this unit not count, because of the station. `reason`, human-readable,
   /// becomes the first of its causes; empty if the verdict counts.
   void invalidate_verdict(std::string reason) { invalid_reason_ = std::move(reason); }
-  const std::string& invalid_verdict_reason() const { return invalid_reason_; }
+  const std::string& invalid_reason() const { return invalid_reason_; }
 
   const UnitStep& step_state(StationStep step) const { return steps_[step_index(step)]; }
   /// Returns the comparison of the type's row time with that of the lamps of all steps, as of the
-  /// last solve_completed_station_steps().
-  const RowTimeCheck& last_row_time_comparison() const { return row_time_; }
+  /// last solve_completed().
+  const RowTimeCheck& row_time_check() const { return row_time_; }
   /// Returns the first step that is not completed; std::nullopt if all are.
-  std::optional<StationStep> first_incomplete_step() const;
+  std::optional<StationStep> first_incomplete() const;
   /// Returns true if continuing is useless. A step then has too many consecutive rejected images,
   /// or it is complete but fails because of the lamps.
   bool can_no_longer_pass() const;
@@ -83,29 +83,29 @@ class Unit {
   /// Returns the calibration of the last completed step; std::nullopt before the lens is known.
   std::optional<Calibration> latest_calibration() const;
   /// Returns all metrics, including those with gates.
-  std::vector<CheckedMetric> collect_unit_metrics() const;
+  std::vector<CheckedMetric> collect_metrics() const;
   /// Returns the plots of lens, rotation center and dispersion for the report, of the solved steps.
   /// Waits for their rendering.
-  std::vector<ReportPlot> collect_report_plots() const;
+  std::vector<ReportPlot> collect_plots() const;
   const StationConfig& station_config() const { return config_; }
   const std::string& camera_id() const { return camera_id_; }
 
  private:
   static std::size_t step_index(StationStep step) { return static_cast<std::size_t>(step); }
   UnitStep& mutable_step_state(StationStep step) { return steps_[step_index(step)]; }
-  void solve_steps_in_order(bool all_in);
-  void process_image_files(StationStep step, const std::vector<std::filesystem::path>& files);
-  LevelRotations find_level_rotations_of_images(StationStep step) const;
-  void reprocess_images_with_changed_inclination(StationStep step);
+  void solve_in_order(bool all_in);
+  void process_files(StationStep step, const std::vector<std::filesystem::path>& files);
+  LevelRotations list_level_rotations(StationStep step) const;
+  void reprocess_inclined(StationStep step);
   void add_image_to_step(StationStep step, UnitImage image);
-  void update_consecutive_rejection_count(StationStep step);
-  void reject_image_if_redundant(StationStep step, UnitImage& image) const;
-  void remove_image_from_step(StationStep step, const std::string& name);
+  void count_rejections(StationStep step);
+  void reject_if_redundant(StationStep step, UnitImage& image) const;
+  void remove_image(StationStep step, const std::string& name);
   void reset_steps_after(StationStep step);
   bool has_sufficient_images(StationStep step) const;
-  StepResult solve_station_step(StationStep step, bool all_in) const;
-  std::optional<Calibration> calibration_before_step(StationStep step) const;
-  HistoryEntry make_step_history_entry(StationStep step) const;
+  StepResult compute_step_result(StationStep step, bool all_in) const;
+  std::optional<Calibration> calibration_before(StationStep step) const;
+  HistoryEntry make_step_entry(StationStep step) const;
 
   const StationConfig& config_;
   std::string camera_id_;
@@ -119,9 +119,9 @@ class Unit {
 };
 
 /// Returns the observations of the images with lamps, rejected ones too.
-std::vector<Observation> list_lamp_image_observations(const Unit& unit);
+std::vector<Observation> list_lamp_observations(const Unit& unit);
 
 /// Returns the row time of the station's type of camera.
-GivenRowTime make_configured_row_time(const StationConfig& config);
+GivenRowTime make_given_row_time(const StationConfig& config);
 
 }  // namespace vlp

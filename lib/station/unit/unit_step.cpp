@@ -20,12 +20,11 @@ UnitImage observe_unit_image(const std::filesystem::path& file,
                              const std::function<Observation(const SourceImage&)>& observe) {
   UnitImage image;
   try {
-    image.sha256 = compute_file_sha256(file);
+    image.sha256 = hash_file(file);
     image.observation = observe(SourceImage(file));
   } catch (const InputError&) {
     image.observation = {file};
-    image.observation.set_image_rejection(RejectionReason::unreadable,
-                                          "cannot be read as an image");
+    image.observation.reject(RejectionReason::unreadable, "cannot be read as an image");
   }
   return image;
 }
@@ -35,17 +34,16 @@ int UnitStep::count_used_images() const {
       images, [](const auto& entry) { return entry.second.is_image_used(); }));
 }
 
-Observations collect_step_observations(const UnitStep& step) {
+Observations list_observations(const UnitStep& step) {
   Observations seen;
   for (const auto& [name, image] : step.images) seen.images.push_back(image.observation);
   return seen;
 }
 
-std::vector<Frame> collect_lamp_detections_of_used_images(const UnitStep& step) {
+std::vector<Frame> list_used_detections(const UnitStep& step) {
   std::vector<Frame> frames;
   for (const UnitImage* image : list_used_images(step)) {
-    frames.push_back(
-        {image->observation.image_file_name(), collect_identified_lamps(image->observation)});
+    frames.push_back({image->observation.image_file_name(), list_identified(image->observation)});
   }
   return frames;
 }
@@ -64,7 +62,7 @@ ImageCoverage compute_board_coverage(const UnitStep& step, const std::array<int,
     if (!image->observation.board) continue;
     for (const PointDetection& corner :
          collect_detected_corners(image->observation.board->detection))
-      coverage.add_corner_to_coverage(corner.pixel);
+      coverage.add_corner(corner.pixel);
   }
   return coverage;
 }
@@ -78,9 +76,9 @@ struct LocatedFrame {
   std::size_t number;
 };
 
-std::vector<LocatedFrame> locate_camera_in_frames(const std::vector<Frame>& frames,
-                                                  const StationConfig& config,
-                                                  const Calibration& calibration) {
+std::vector<LocatedFrame> locate_frames(const std::vector<Frame>& frames,
+                                        const StationConfig& config,
+                                        const Calibration& calibration) {
   PositionerOptions options;
   options.correction = Correction::none;
   const Positioner positioner(config.lamps, calibration, options);
@@ -101,9 +99,9 @@ std::vector<LocatedFrame> locate_camera_in_frames(const std::vector<Frame>& fram
 
 YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const StationConfig& config,
                                  const Calibration& calibration) {
-  constexpr double same_height = 0.06;  // find_in_place_rotation_captures() decides
+  constexpr double same_height = 0.06;  // detect_pivots() decides
   const auto parts = static_cast<std::size_t>(config.completion.rotation_captures);
-  const auto located = locate_camera_in_frames(frames, config, calibration);
+  const auto located = locate_frames(frames, config, calibration);
   YawCoverage map;
   for (std::size_t begin = 0, end = 0; begin < located.size(); begin = end) {
     YawCoverage::Height height{located[begin].z_m, 0, 0, std::vector<bool>(parts)};
@@ -122,7 +120,7 @@ YawCoverage compute_yaw_coverage(const std::vector<Frame>& frames, const Station
       height.covered_sectors[part % parts] = true;
     }
     height.captures = static_cast<int>(yaws_rad.size());
-    height.arc_rad = compute_angular_coverage(yaws_rad);
+    height.arc_rad = measure_arc(yaws_rad);
     height.is_complete = height.captures >= config.completion.rotation_captures &&
                          height.arc_rad >= config.completion.rotation_arc_rad;
     map.heights.push_back(std::move(height));

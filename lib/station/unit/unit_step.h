@@ -94,9 +94,9 @@ struct UnitStep {
 };
 
 /// Returns the observations of the images, by name.
-Observations collect_step_observations(const UnitStep& step);
+Observations list_observations(const UnitStep& step);
 /// Returns the frames of the images that are used, by name.
-std::vector<Frame> collect_lamp_detections_of_used_images(const UnitStep& step);
+std::vector<Frame> list_used_detections(const UnitStep& step);
 /// Returns the images that are used, by name.
 std::vector<const UnitImage*> list_used_images(const UnitStep& step);
 

@@ -28,7 +28,7 @@ void append_causes(std::vector<Cause>& causes, std::vector<Cause> more) {
   std::move(more.begin(), more.end(), std::back_inserter(causes));
 }
 
-bool is_step_result_valid(const UnitStep& state) {
+bool is_result_valid(const UnitStep& state) {
   return state.result && state.result->has_succeeded();
 }
 
@@ -41,7 +41,7 @@ struct RejectionSummary {
 };
 
 /// Returns the minimum number of images for a fault of the camera; fewer can be accidental.
-int min_images_to_blame_camera(const StationConfig& config) {
+int min_images_to_blame(const StationConfig& config) {
   return std::min(config.max_consecutive_rejections, (config.completion.board_views + 1) / 2);
 }
 
@@ -58,16 +58,16 @@ RejectionSummary summarize_rejections(const UnitStep& state, const StationConfig
     return image.rejection->reason == RejectionReason::blurred;
   });
   return {fmt::format("{} of {} images refused: {}", rejected.size(), state.images.size(),
-                      summarize_image_rejections(rejected)),
-          2 * blurred > std::ssize(rejected) && blurred >= min_images_to_blame_camera(config)};
+                      summarize_rejected_images(rejected)),
+          2 * blurred > std::ssize(rejected) && blurred >= min_images_to_blame(config)};
 }
 
 /// Returns the reasons why a step did not finish.
-std::vector<Cause> find_step_problems(const Unit& unit, StationStep step) {
+std::vector<Cause> list_step_problems(const Unit& unit, StationStep step) {
   const UnitStep& state = unit.step_state(step);
   if (state.is_step_solved()) return {};
   std::vector<Cause> causes;
-  const std::string count = format_step_image_count(unit, step);
+  const std::string count = format_image_count(unit, step);
   const RejectionSummary refused = summarize_rejections(state, unit.station_config());
   if (!refused.text.empty()) {
     causes.push_back({fmt::format("{} ({}): {}", station_step_name(step), count, refused.text),
@@ -107,11 +107,11 @@ bool is_gate_missed(const CheckedMetric& metric) {
 
 /// Returns the problems of a step and its failed gates, those of the station before those of the
 /// camera.
-std::vector<Cause> find_step_causes(const Unit& unit, StationStep step,
+std::vector<Cause> list_step_causes(const Unit& unit, StationStep step,
                                     const std::vector<CheckedMetric>& metrics) {
-  std::vector<Cause> causes = find_step_problems(unit, step);
+  std::vector<Cause> causes = list_step_problems(unit, step);
   const UnitStep& state = unit.step_state(step);
-  if (!is_step_result_valid(state)) return causes;
+  if (!is_result_valid(state)) return causes;
   for (const bool of_camera : {false, true}) {
     append_causes(causes, describe_failures(metrics, of_camera, [&](const CheckedMetric& metric) {
                     return find_metric_value(state.result->metrics, metric.name) &&
@@ -135,11 +135,11 @@ bool is_other_board(const UnitStep& boards) {
 bool is_blur_known(const UnitStep& boards, const StationConfig& config) {
   return boards.sufficient || std::ranges::count_if(boards.images, [](const auto& entry) {
                                 return entry.second.observation.blur_px.has_value();
-                              }) >= min_images_to_blame_camera(config);
+                              }) >= min_images_to_blame(config);
 }
 
 /// Returns the causes visible in the board images: another board, blur, and faults of the lens.
-std::vector<Cause> find_board_causes(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
+std::vector<Cause> list_board_causes(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
   std::vector<Cause> causes;
   const UnitStep& boards = unit.step_state(StationStep::boards);
   // [STATION-19] `wrong board:`
@@ -149,95 +149,90 @@ std::vector<Cause> find_board_causes(const Unit& unit, const std::vector<Checked
                     return metric.name == "blur_px" && is_gate_missed(metric);
                   }));
   }
-  append_causes(causes, find_step_causes(unit, StationStep::boards, metrics));
+  append_causes(causes, list_step_causes(unit, StationStep::boards, metrics));
   return causes;
 }
 
 /// Returns the causes of the steps with lamps whose previous step is solved.
-std::vector<Cause> find_lamp_step_causes(const Unit& unit,
-                                         const std::vector<CheckedMetric>& metrics) {
+std::vector<Cause> list_lamp_causes(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
   std::vector<Cause> causes;
   StationStep before = StationStep::boards;
   for (const StationStep step : kLampSteps) {
-    if (!is_step_result_valid(unit.step_state(std::exchange(before, step)))) break;
-    append_causes(causes, find_step_causes(unit, step, metrics));
+    if (!is_result_valid(unit.step_state(std::exchange(before, step)))) break;
+    append_causes(causes, list_step_causes(unit, step, metrics));
   }
   return causes;
 }
 
 /// Returns faults of the known points, of the images of the check, or of the camera in the check.
-std::vector<Cause> find_check_faults(const Unit& unit, const Calibration& calibration) {
+std::vector<Cause> list_check_faults(const Unit& unit, const Calibration& calibration) {
   const UnitStep& check = unit.step_state(StationStep::check);
-  if (!is_step_result_valid(check)) return {};
+  if (!is_result_valid(check)) return {};
   const LampMap& lamps = unit.station_config().lamps;
-  const CapturesWithPositions captures{collect_lamp_detections_of_used_images(check),
+  const CapturesWithPositions captures{list_used_detections(check),
                                        read_captures_with_truth(check.folder)};
   // A common offset is no fault of single captures; one that rotates is a fault of the camera.
-  const auto offset =
-      find_common_position_offset(captures.frames, lamps, calibration, captures.positions);
-  if (offset && !offset->in_camera) return {{describe_common_position_offset(*offset)}};
+  const auto offset = find_common_offset(captures.frames, lamps, calibration, captures.positions);
+  if (offset && !offset->in_camera) return {{describe_common_offset(*offset)}};
   if (!offset) {
     std::string fault =
-        describe_wrong_reference_positions(captures.frames, lamps, calibration, captures.positions);
+        explain_wrong_positions(captures.frames, lamps, calibration, captures.positions);
     if (!fault.empty()) return {{std::move(fault)}};
   }
   const UnitStep& dispersion = unit.step_state(StationStep::dispersion);
-  const CapturesWithPositions reference{collect_lamp_detections_of_used_images(dispersion),
+  const CapturesWithPositions reference{list_used_detections(dispersion),
                                         read_captures_with_truth(dispersion.folder)};
-  std::string other = describe_focal_length_difference(captures, reference, lamps, calibration);
+  std::string other = explain_focal_difference(captures, reference, lamps, calibration);
   // Without an offset, residuals can be caused by a lens that is inaccurate near the corners.
   if (other.empty() && offset) {
-    other = describe_residual_increase_by_other_lens(captures.frames, reference.frames, lamps,
-                                                     calibration);
+    other = explain_other_lens(captures.frames, reference.frames, lamps, calibration);
   }
   if (!other.empty()) {
     return {{"the images of check are of another camera: " + other + "; take them with this unit"}};
   }
-  if (offset) return {{describe_common_position_offset(*offset), true}};
+  if (offset) return {{describe_common_offset(*offset), true}};
   return {};
 }
 
 /// Returns faults of the lamps and of the lens, from the captures of all steps. Without these,
 /// returns faults of the known points or of the camera in the check.
-std::vector<Cause> find_station_faults(const Unit& unit) {
+std::vector<Cause> list_station_faults(const Unit& unit) {
   const auto known = unit.latest_calibration();
   if (!known) return {};
   // Tested first, because a wrong row time confuses or removes lamps.
   const Lens lens(known->camera.lens_model, known->camera.intrinsics);
   std::string row_time =
-      describe_alternative_row_time(list_lamp_image_observations(unit), unit.station_config().lamps,
-                                    lens, make_configured_row_time(unit.station_config()));
+      describe_other_row_time(list_lamp_observations(unit), unit.station_config().lamps, lens,
+                              make_given_row_time(unit.station_config()));
   if (!row_time.empty()) return {{std::move(row_time)}};
   std::vector<Frame> frames;
   for (const StationStep step : kLampSteps) {
-    for (Frame& frame : collect_lamp_detections_of_used_images(unit.step_state(step)))
+    for (Frame& frame : list_used_detections(unit.step_state(step)))
       frames.push_back(std::move(frame));
   }
   std::vector<Cause> causes;
-  for (const auto& faults : {describe_lamp_map_faults(frames, unit.station_config().lamps, *known),
-                             describe_missing_lamps(frames, unit.station_config().lamps)}) {
+  for (const auto& faults : {list_lamp_map_faults(frames, unit.station_config().lamps, *known),
+                             list_missing_lamps(frames, unit.station_config().lamps)}) {
     for (const std::string& fault : faults) causes.push_back({fault});
   }
   if (!causes.empty()) return causes;
-  if (std::string fault =
-          describe_contradiction_to_calibrated_lens(frames, unit.station_config().lamps, *known);
+  if (std::string fault = explain_lens_contradiction(frames, unit.station_config().lamps, *known);
       !fault.empty()) {
     return {{std::move(fault)}};
   }
-  return find_check_faults(unit, *known);
+  return list_check_faults(unit, *known);
 }
 
 }  // namespace
 
-RunRecord make_unit_run_record(const Unit& unit, const std::string& run,
-                               const ProgramVersion& program) {
-  RunRecord record =
-      make_common_run_record("unit", unit.station_config(), unit.camera_id(), run, program);
+RunRecord make_unit_record(const Unit& unit, const std::string& run,
+                           const ProgramVersion& program) {
+  RunRecord record = make_run_record("unit", unit.station_config(), unit.camera_id(), run, program);
   if (const auto calibration = unit.latest_calibration()) {
-    record.calibration = format_calibration_yaml(*calibration);
+    record.calibration = format_calibration(*calibration);
   }
-  record.metrics = unit.collect_unit_metrics();
-  record.set_verdict_from_causes(find_causes_of_failure(unit));
+  record.metrics = unit.collect_metrics();
+  record.set_causes(list_failure_causes(unit));
   for (const StationStep step : kStationSteps) {
     for (const auto& [name, image] : unit.step_state(step).images) {
       std::string refused = image.rejection_message();
@@ -251,41 +246,41 @@ RunRecord make_unit_run_record(const Unit& unit, const std::string& run,
       // [STATION-16] `not looked at:`
       record.images.push_back({.step = station_step_name(step),
                                .name = file.filename().string(),
-                               .sha256 = compute_file_sha256(file),
+                               .sha256 = hash_file(file),
                                .rejection = "not looked at: a step before is not done"});
     }
   }
   return record;
 }
 
-void invalidate_run_for_reused_images(RunRecord& record, const std::string& earlier,
-                                      const std::filesystem::path& station_file) {
+void invalidate_reuse(RunRecord& record, const std::string& earlier,
+                      const std::filesystem::path& station_file) {
   // [STATION-6] `no repetition` | images used in the stated run | new images, or void that run if
   //   its serial was wrong
   record.invalidate_verdict(fmt::format(
       "all images are those of run {}, which is no repetition: take new ones, or '{}' if that run "
       "should not count",
-      earlier, format_run_voiding_command(earlier, station_file)));
+      earlier, format_void_command(earlier, station_file)));
 }
 
-std::vector<Cause> find_causes_of_failure(const Unit& unit) {
-  const std::vector<CheckedMetric> metrics = unit.collect_unit_metrics();
-  const std::vector<Cause> board_causes = find_board_causes(unit, metrics);
-  std::vector<Cause> lamp_causes = find_lamp_step_causes(unit, metrics);
-  if (!unit.first_incomplete_step()) {
+std::vector<Cause> list_failure_causes(const Unit& unit) {
+  const std::vector<CheckedMetric> metrics = unit.collect_metrics();
+  const std::vector<Cause> board_causes = list_board_causes(unit, metrics);
+  std::vector<Cause> lamp_causes = list_lamp_causes(unit, metrics);
+  if (!unit.first_incomplete()) {
     append_causes(lamp_causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
                     return !metric.value;
                   }));
   }
 
   std::vector<Cause> causes;
-  if (!unit.invalid_verdict_reason().empty()) causes.push_back({unit.invalid_verdict_reason()});
+  if (!unit.invalid_reason().empty()) causes.push_back({unit.invalid_reason()});
   append_causes(causes,
                 board_causes);  // before faults of the lamps: the lens was measured without them
-  if (std::string error = unit.last_row_time_comparison().error; !error.empty()) {
+  if (std::string error = unit.row_time_check().error; !error.empty()) {
     causes.push_back({std::move(error)});
   } else if (!board_causes.empty() || !lamp_causes.empty()) {
-    append_causes(causes, find_station_faults(unit));
+    append_causes(causes, list_station_faults(unit));
   }
   append_causes(causes, std::move(lamp_causes));
   // Gates of make_row_time_metrics(), which refer to all steps together.

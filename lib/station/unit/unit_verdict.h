@@ -12,19 +12,18 @@
 namespace vlp {
 
 /// Makes the record of a unit's run that ends now, under the run's name `run`.
-RunRecord make_unit_run_record(const Unit& unit, const std::string& run,
-                               const ProgramVersion& program);
+RunRecord make_unit_record(const Unit& unit, const std::string& run, const ProgramVersion& program);
 
 /// Makes the verdict of a run INVALID because its images are those of an earlier judged run of the
 /// unit. The run would otherwise count twice. The caller has compared the images.
 /// @param earlier       id of the earlier run, for the message
 /// @param station_file  path of station.yaml, for the command in the message
-void invalidate_run_for_reused_images(RunRecord& record, const std::string& earlier,
-                                      const std::filesystem::path& station_file);
+void invalidate_reuse(RunRecord& record, const std::string& earlier,
+                      const std::filesystem::path& station_file);
 
 /// Returns the reasons why a unit does not pass, the most important one first; empty if it passes.
 /// Faults of the station and of the operator precede results that depend on them. The camera
-/// therefore fails by decide_verdict_from_causes() only for its own errors.
-std::vector<Cause> find_causes_of_failure(const Unit& unit);
+/// therefore fails by decide_verdict() only for its own errors.
+std::vector<Cause> list_failure_causes(const Unit& unit);
 
 }  // namespace vlp

@@ -32,66 +32,61 @@ class Verification {
     config_.nominal_camera = golden_.calibration.camera;
   }
 
-  void check_golden_boards() {
+  void check_boards() {
     const BoardIntake intake(config_.board, config_.frontend, config_.nominal_camera.imager_px);
-    const UnitStep step = observe_folder(
-        folder_ / "boards", ImageUse::boards,
-        [&](const SourceImage& image) { return intake.detect_board_in_image(image); });
+    const UnitStep step =
+        observe_folder(folder_ / "boards", ImageUse::boards,
+                       [&](const SourceImage& image) { return intake.detect_board(image); });
     if (step.count_used_images() > 0)
-      add_step_result("boards", calibrate_lens_on_station(config_, golden_.camera_id,
-                                                          collect_step_observations(step)));
+      add_step_result("boards",
+                      run_station_lens(config_, golden_.camera_id, list_observations(step)));
     add_images(StationStep::boards, step);
   }
 
-  void check_golden_lamp_captures(StationStep station_step) {
+  void check_lamps(StationStep station_step) {
     const fs::path folder = folder_ / station_step_name(station_step);
-    const LampIntake intake(LightDetector(config_.lamps, make_detector_camera(golden_.calibration)),
-                            ImageUse::known_positions, config_.frontend,
-                            config_.nominal_camera.imager_px,
-                            compute_level_rotations_of_images(read_captures_csv_of_folder(folder),
-                                                              golden_.calibration, 0));
+    const LampIntake intake(
+        LightDetector(config_.lamps, make_detector_camera(golden_.calibration)),
+        ImageUse::known_positions, config_.frontend, config_.nominal_camera.imager_px,
+        compute_level_rotations(read_folder_captures(folder), golden_.calibration, 0));
     const UnitStep step = observe_folder(
         folder, ImageUse::known_positions,
         [&](const SourceImage& image) { return intake.detect_lamps_in_image(image); });
-    std::ranges::move(collect_step_observations(step).images, std::back_inserter(lamp_images_));
-    const auto frames = collect_lamp_detections_of_used_images(step);
+    std::ranges::move(list_observations(step).images, std::back_inserter(lamp_images_));
+    const auto frames = list_used_detections(step);
     frames_.insert(frames_.end(), frames.begin(), frames.end());
     const auto places = read_captures_with_truth(step.folder);
     if (station_step == StationStep::check) {
-      common_offset_ =
-          find_common_position_offset(frames, config_.lamps, golden_.calibration, places);
-      place_fault_ =
-          describe_wrong_reference_positions(frames, config_.lamps, golden_.calibration, places);
+      common_offset_ = find_common_offset(frames, config_.lamps, golden_.calibration, places);
+      place_fault_ = explain_wrong_positions(frames, config_.lamps, golden_.calibration, places);
     }
-    add_step_result(
-        station_step_name(station_step),
-        station_step == StationStep::check
-            ? check_position_accuracy_on_station(config_, golden_.calibration, frames, places)
-            : calibrate_dispersion_on_station(config_, golden_.calibration, frames, places));
+    add_step_result(station_step_name(station_step),
+                    station_step == StationStep::check
+                        ? run_station_check(config_, golden_.calibration, frames, places)
+                        : run_station_dispersion(config_, golden_.calibration, frames, places));
     add_images(station_step, step);
   }
 
-  RunRecord make_verification_record(const std::string& run, const ProgramVersion& program) {
+  RunRecord make_record(const std::string& run, const ProgramVersion& program) {
     const GivenRowTime stated{*config_.nominal_camera.row_time_s,
                               "the calibration of the golden unit"};
-    const RowTimeCheck row_time = check_row_time_against_lamps(lamp_images_, config_.lamps, stated);
+    const RowTimeCheck row_time = check_row_time(lamp_images_, config_.lamps, stated);
     for (const Metric& metric : make_row_time_metrics(row_time)) values_.push_back(metric);
-    RunRecord record = make_common_run_record("golden", config_, golden_.camera_id, run, program);
-    record.metrics =
-        check_all_metrics_against_gates(golden_.gates, values_, list_unit_metric_kinds());
+    RunRecord record = make_run_record("golden", config_, golden_.camera_id, run, program);
+    record.metrics = check_against_gates(golden_.gates, values_, list_unit_metrics());
     record.images = images_;
     for (const CheckedMetric& metric : record.metrics) {
       // The station is under test, and fails by its metrics.
       if (!metric.has_passed_gate())
         causes_.push_back({describe_failed_gate(metric), metric.value.has_value()});
     }
-    std::vector<Cause> causes = find_station_causes(row_time, stated);
+    std::vector<Cause> causes = list_station_causes(row_time, stated);
     causes.insert(causes.end(), causes_.begin(), causes_.end());
-    record.set_verdict_from_causes(std::move(causes));
+    record.set_causes(std::move(causes));
     return record;
   }
 
-  std::vector<ReportPlot> collect_report_plots() const {
+  std::vector<ReportPlot> collect_plots() const {
     std::vector<ReportPlot> pictures;
     for (const StepPlot& plot : plots_) {
       if (const auto& picture = plot.get()) pictures.push_back(*picture);
@@ -101,27 +96,26 @@ class Verification {
 
  private:
   /// Returns the causes that precede the failed steps and gates.
-  std::vector<Cause> find_station_causes(const RowTimeCheck& row_time, const GivenRowTime& stated) {
+  std::vector<Cause> list_station_causes(const RowTimeCheck& row_time, const GivenRowTime& stated) {
     std::string row_time_error = row_time.error;
     if (row_time_error.empty() && !causes_.empty()) {
       const Camera& camera = golden_.calibration.camera;
-      row_time_error = describe_alternative_row_time(
-          lamp_images_, config_.lamps, Lens(camera.lens_model, camera.intrinsics), stated);
+      row_time_error = describe_other_row_time(lamp_images_, config_.lamps,
+                                               Lens(camera.lens_model, camera.intrinsics), stated);
     }
     // Independent of the gates: this camera is known.
     constexpr double min_offset_px = 0.6;
-    auto faults =
-        describe_lamp_map_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
+    auto faults = list_lamp_map_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
     if (!causes_.empty()) {
       // If all gates pass, they decide whether all lamps must be detected.
-      std::ranges::move(describe_missing_lamps(frames_, config_.lamps), std::back_inserter(faults));
+      std::ranges::move(list_missing_lamps(frames_, config_.lamps), std::back_inserter(faults));
     }
     std::vector<Cause> causes;
     if (!row_time_error.empty()) causes.push_back({row_time_error, false});
     for (const std::string& fault : faults) causes.push_back({fault, true});
     if (!faults.empty()) return causes;
     if (common_offset_ && !causes_.empty()) {
-      causes.push_back({describe_common_position_offset(*common_offset_), true});
+      causes.push_back({describe_common_offset(*common_offset_), true});
     } else if (!place_fault_.empty()) {
       causes.push_back({place_fault_, false});
     }
@@ -133,14 +127,13 @@ class Verification {
   UnitStep observe_folder(const fs::path& folder, ImageUse use, const Detect& detect) const {
     const auto files = list_images(folder);
     std::vector<UnitImage> images(files.size());
-    process_images_in_parallel(files.size(), threads_, [&](std::size_t i) {
-      images[i] = observe_unit_image(files[i], detect);
-    });
+    process_images(files.size(), threads_,
+                   [&](std::size_t i) { images[i] = observe_unit_image(files[i], detect); });
     UnitStep step;
     step.folder = folder;
     Selection selection(use, config_.frontend);
     for (UnitImage& image : images) {
-      selection.add_image_or_reject_as_repeated(image.observation);
+      selection.add_or_reject(image.observation);
       std::string name = image.observation.image_file_name();
       step.images.emplace(std::move(name), std::move(image));
     }
@@ -181,23 +174,22 @@ class Verification {
 
 }  // namespace
 
-VerificationResult verify_station_from_golden_images(const StationConfig& config,
-                                                     const fs::path& folder, const std::string& run,
-                                                     const ProgramVersion& program, int threads) {
+VerificationResult verify_from_images(const StationConfig& config, const fs::path& folder,
+                                      const std::string& run, const ProgramVersion& program,
+                                      int threads) {
   Verification verification(config, folder, threads);
-  if (fs::is_directory(folder / "boards")) verification.check_golden_boards();
-  if (fs::is_directory(folder / "dispersion"))
-    verification.check_golden_lamp_captures(StationStep::dispersion);
-  verification.check_golden_lamp_captures(StationStep::check);
-  return {verification.make_verification_record(run, program), verification.collect_report_plots()};
+  if (fs::is_directory(folder / "boards")) verification.check_boards();
+  if (fs::is_directory(folder / "dispersion")) verification.check_lamps(StationStep::dispersion);
+  verification.check_lamps(StationStep::check);
+  return {verification.make_record(run, program), verification.collect_plots()};
 }
 
-void invalidate_run_if_images_reused(
+void invalidate_if_reused(
     RunRecord& record,
-    const std::function<std::string(const std::string& sha256)>& find_golden_run_using_image) {
+    const std::function<std::string(const std::string& sha256)>& find_golden_user) {
   for (const RunRecord::Image& image : record.images) {
     if (!image.rejection.empty()) continue;
-    const std::string run = find_golden_run_using_image(image.sha256);
+    const std::string run = find_golden_user(image.sha256);
     if (run.empty()) continue;
     record.invalidate_verdict(fmt::format("image {}/{} was used in golden run {}: measure it again",
                                           image.step, image.name, run));

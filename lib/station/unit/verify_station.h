@@ -13,7 +13,7 @@
 
 namespace vlp {
 
-/// Result of verify_station_from_golden_images(), with the plots of boards and dispersion.
+/// Result of verify_from_images(), with the plots of boards and dispersion.
 struct VerificationResult {
   RunRecord record;
   std::vector<ReportPlot> pictures;
@@ -33,16 +33,15 @@ struct VerificationResult {
 /// nominal_difference_px). A difference shows that the board has changed. Fixes use the known
 /// calibration; their errors show that lamps or known points have moved. FAIL here refers to the
 /// station, and INVALID means that the golden unit was not measured.
-VerificationResult verify_station_from_golden_images(const StationConfig& config,
-                                                     const std::filesystem::path& folder,
-                                                     const std::string& run,
-                                                     const ProgramVersion& program, int threads);
+VerificationResult verify_from_images(const StationConfig& config,
+                                      const std::filesystem::path& folder, const std::string& run,
+                                      const ProgramVersion& program, int threads);
 
 /// Makes the record INVALID if an earlier run used one of its images, because the image does not
-/// show the current state of the station. `find_golden_run_using_image` returns the earlier run
+/// show the current state of the station. `find_golden_user` returns the earlier run
 /// that used an image of this digest; empty if there is none.
-void invalidate_run_if_images_reused(
+void invalidate_if_reused(
     RunRecord& record,
-    const std::function<std::string(const std::string& sha256)>& find_golden_run_using_image);
+    const std::function<std::string(const std::string& sha256)>& find_golden_user);
 
 }  // namespace vlp

@@ -36,7 +36,7 @@ std::string make_table_state(const fs::path& folder) {
 
 SharedFolder open_captures(const fs::path& captures, const std::string& camera) {
   create_station_folder(captures);
-  return SharedFolder(captures).open_or_create_subfolder({camera, captures, "camera"});
+  return SharedFolder(captures).open_or_create({camera, captures, "camera"});
 }
 
 }  // namespace
@@ -45,12 +45,11 @@ WatchedRun::WatchedRun(Unit& unit, Spool& spool)
     : unit_(unit),
       folder_(unit.station_config().captures / unit.camera_id()),
       files_(open_captures(unit.station_config().captures, unit.camera_id())) {
-  start_or_continue_run(spool);
+  start_or_continue(spool);
   if (finished_) return;
   steps_.reserve(kStationSteps.size());
   for (const StationStep step : kStationSteps) {
-    SharedFolder folder =
-        files_.open_or_create_subfolder({station_step_name(step), folder_, "step"});
+    SharedFolder folder = files_.open_or_create({station_step_name(step), folder_, "step"});
     const fs::path path = folder.folder_path();
     steps_.push_back({std::move(folder), WatchedFolder(path)});
   }
@@ -63,7 +62,7 @@ WatchedRun::~WatchedRun() {
 /// Reads the run id from `.run`. Returns true if the run is stored.
 bool WatchedRun::read_run_state() {
   constexpr std::size_t max_bytes = 100;
-  const auto state = files_.read_file_if_exists(kState, max_bytes);
+  const auto state = files_.read_if_exists(kState, max_bytes);
   if (!state) return false;
   run_ = state->substr(0, state->find('\n'));
   if (!is_run_id(run_)) {
@@ -73,7 +72,7 @@ bool WatchedRun::read_run_state() {
   return state->ends_with(fmt::format("\n{}\n", kKept));
 }
 
-void WatchedRun::start_or_continue_run(Spool& spool) {
+void WatchedRun::start_or_continue(Spool& spool) {
   constexpr const char* lock = ".lock";
   lock_ = files_.open_regular_file(lock, O_CREAT | O_RDWR);
   if (lock_ < 0) throw InputError(folder_ / lock, "cannot be written");
@@ -83,7 +82,7 @@ void WatchedRun::start_or_continue_run(Spool& spool) {
   const bool is_stored = read_run_state();
   if (run_.empty()) {
     run_ = make_run_id();
-    files_.replace_file_atomically(kState, run_ + "\n");
+    files_.replace_file(kState, run_ + "\n");
     return;
   }
   finished_ = spool.find_run_by_id(run_);
@@ -98,15 +97,15 @@ void WatchedRun::start_or_continue_run(Spool& spool) {
         folder_, fmt::format("run {} is stored, but its record cannot be read ({}): repeat when it "
                              "can, or move the folder away",
                              run_,
-                             spool.last_offline_reason().empty() ? "the records do not have it"
-                                                                 : spool.last_offline_reason()));
+                             spool.offline_reason().empty() ? "the records do not have it"
+                                                            : spool.offline_reason()));
   }
   if (!finished_) return;  // the run continues
   publish_run_files(*finished_, {}, unit_.station_config().results);
-  rename_finished_run_folder();
+  rename_finished();
 }
 
-std::vector<WatchedRun::ImageChange> WatchedRun::process_folder_changes(std::size_t max_images) {
+std::vector<WatchedRun::ImageChange> WatchedRun::process_changes(std::size_t max_images) {
   std::vector<ImageChange> arrivals;
   bool reread = false;
   for (const StationStep step : kStationSteps) {
@@ -114,13 +113,13 @@ std::vector<WatchedRun::ImageChange> WatchedRun::process_folder_changes(std::siz
     std::string tables = make_table_state(images.watched_folder());
     if (tables != known_tables) {
       known_tables = std::move(tables);
-      unit_.reprocess_step_with_changed_tables(step);
+      unit_.reprocess_step(step);
       reread = true;
     }
-    const auto changes = images.poll_folder_changes();
+    const auto changes = images.poll();
     for (const std::string& name : changes.removed) {
       std::erase_if(waiting, [&](const fs::path& file) { return file.filename() == name; });
-      unit_.remove_deleted_image(step, name);
+      unit_.remove_deleted(step, name);
       arrivals.push_back({step, name, true});
     }
     waiting.insert(waiting.end(), changes.added.begin(), changes.added.end());
@@ -132,30 +131,30 @@ std::vector<WatchedRun::ImageChange> WatchedRun::process_folder_changes(std::siz
     unit_.add_step_images(step, now, !waiting.empty());
     for (const fs::path& file : now) arrivals.push_back({step, file.filename().string(), false});
   }
-  if (!arrivals.empty() || reread) unit_.solve_completed_station_steps(false);
+  if (!arrivals.empty() || reread) unit_.solve_completed(false);
   return arrivals;
 }
 
 void WatchedRun::mark_run_stored() const {
   try {
-    files_.replace_file_atomically(kState, fmt::format("{}\n{}\n", run_, kKept));
-  } catch (const InputError&) {  // rename_finished_run_folder() reports it; records reject a second
+    files_.replace_file(kState, fmt::format("{}\n{}\n", run_, kKept));
+  } catch (const InputError&) {  // rename_finished() reports it; records reject a second
                                  // verdict
   }
 }
 
-void WatchedRun::delete_rejected_image_file(StationStep step, const std::string& image) {
+void WatchedRun::delete_rejected(StationStep step, const std::string& image) {
   step_folder(step).remove_file(image);
-  steps_[static_cast<std::size_t>(step)].images.ignore_removal_of_file(image);
+  steps_[static_cast<std::size_t>(step)].images.ignore_removal(image);
   unit_.mark_image_discarded(step, image);
 }
 
-void WatchedRun::rename_finished_run_folder() const {
-  files_.check_folder_not_replaced();
-  vlp::rename_finished_run_folder(folder_, run_);
+void WatchedRun::rename_finished() const {
+  files_.check_not_replaced();
+  vlp::rename_finished(folder_, run_);
 }
 
-void rename_finished_run_folder(const fs::path& folder, const std::string& run) {
+void rename_finished(const fs::path& folder, const std::string& run) {
   const fs::path kept = folder.string() + "." + run;
   std::error_code error;
   fs::rename(folder, kept, error);
@@ -165,7 +164,7 @@ void rename_finished_run_folder(const fs::path& folder, const std::string& run) 
   }
 }
 
-WatchedFolder::Changes WatchedFolder::poll_folder_changes() {
+WatchedFolder::Changes WatchedFolder::poll() {
   std::map<std::string, File> now;
   std::error_code error;
   for (fs::directory_iterator entry(folder_, error), end; !error && entry != end;

@@ -31,9 +31,9 @@ class WatchedFolder {
   /// Returns the changes since the last call. An image is new if file, size and time are the same
   /// in two successive calls, so that it is no longer being written. Ignores names that begin with
   /// a dot, which are incomplete files.
-  Changes poll_folder_changes();
+  Changes poll();
   /// Ignores the removal of a file that the caller is about to delete.
-  void ignore_removal_of_file(const std::string& name) { files_.erase(name); }
+  void ignore_removal(const std::string& name) { files_.erase(name); }
 
   const std::filesystem::path& watched_folder() const { return folder_; }
 
@@ -49,7 +49,7 @@ class WatchedFolder {
 
 /// Renames the folder of a finished run, CAPTURES/CAMERA, to CAPTURES/CAMERA.RUN, with its images.
 /// Throws InputError.
-void rename_finished_run_folder(const std::filesystem::path& folder, const std::string& run);
+void rename_finished(const std::filesystem::path& folder, const std::string& run);
 
 /// Run of a unit whose images arrive in CAPTURES/CAMERA/STEP/. One program at a time processes a
 /// camera.
@@ -72,7 +72,7 @@ class WatchedRun {
 
   /// Returns the record of a run whose program was killed after the verdict. The run is already
   /// published and moved away, and no images are left to process.
-  const std::optional<RunRecord>& finished_run_record() const { return finished_; }
+  const std::optional<RunRecord>& finished_record() const { return finished_; }
 
   struct ImageChange {
     StationStep step;
@@ -81,11 +81,11 @@ class WatchedRun {
   };
   /// Processes changes, at most `max_images` images, and solves the steps that are complete.
   /// Returns the changes.
-  std::vector<ImageChange> process_folder_changes(std::size_t max_images);
+  std::vector<ImageChange> process_changes(std::size_t max_images);
 
   /// Deletes the file of a rejected image; its rejection remains (Unit::mark_image_discarded()).
   /// Throws InputError if it cannot be deleted.
-  void delete_rejected_image_file(StationStep step, const std::string& image);
+  void delete_rejected(StationStep step, const std::string& image);
 
   const std::string& run_id() const { return run_; }
   const std::filesystem::path& run_folder() const { return folder_; }
@@ -95,9 +95,9 @@ class WatchedRun {
 
   /// Marks the run as stored. It is not judged again afterwards, even if the records are offline.
   void mark_run_stored() const;
-  /// Renames the folder by rename_finished_run_folder(). Throws InputError also if its path leads
+  /// Renames the folder by rename_finished(). Throws InputError also if its path leads
   /// elsewhere by now.
-  void rename_finished_run_folder() const;
+  void rename_finished() const;
 
  private:
   struct Step {
@@ -108,7 +108,7 @@ class WatchedRun {
     /// State of the tables of the captures' positions.
     std::string tables = {};
   };
-  void start_or_continue_run(Spool& spool);
+  void start_or_continue(Spool& spool);
   bool read_run_state();
 
   Unit& unit_;

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Outliers among detections, surveyed lamps and known positions of run_bundle_adjustment(), at
+/// Outliers among detections, surveyed lamps and known positions of adjust_bundle(), at
 /// their limits.
 #include <gmock/gmock.h>
 
@@ -77,7 +77,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampIsMovedFromChiSquaredLimitOn) {
     }
     move_lamp();
     ASSERT_NEAR(chi_squared / kMovedLimit, fraction, 1e-3);
-    const AdjustmentResult found = run_bundle_adjustment(input);
+    const AdjustmentResult found = adjust_bundle(input);
     ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
     ASSERT_EQ(found.rejected_detections, 0);
     ASSERT_EQ(found.noise_scale, 1);
@@ -105,7 +105,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsAreNotMovedIfIncreasedNoiseExplainsThem
   const Solution expected = solve(1);
   for (const bool is_checked : {true, false}) {
     input.captures_are_checked = is_checked;
-    const AdjustmentResult found = run_bundle_adjustment(input);
+    const AdjustmentResult found = adjust_bundle(input);
     ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
     EXPECT_THAT(list_moved_lamps(found), testing::IsEmpty());
     ASSERT_EQ(found.rejected_detections, 0);
@@ -122,7 +122,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsAreMovedOnlyIfMostAgreeWithSurvey) {
   input.lamps.lamps[0].position_m = true_lamps_m[0] + Eigen::Vector3d(0.02, -0.01, 0.01);
   input.lamps.lamps[3].position_m = true_lamps_m[3] + Eigen::Vector3d(-0.01, -0.02, 0);
   measure(0.05, 0.03);
-  const AdjustmentResult of_five = run_bundle_adjustment(input);
+  const AdjustmentResult of_five = adjust_bundle(input);
   ASSERT_TRUE(of_five.has_succeeded()) << of_five.undetermined;
   EXPECT_THAT(list_moved_lamps(of_five), testing::ElementsAre(11, 14));
   EXPECT_THAT(of_five.notes, testing::SizeIs(1)) << "lamp in no capture";
@@ -131,7 +131,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsAreMovedOnlyIfMostAgreeWithSurvey) {
   EXPECT_THAT(of_five.lamps[3].correction_m, IsNear(Eigen::Vector3d(0.01, 0.02, 0), 2e-3));
 
   for (AdjustmentCapture& capture : input.captures) capture.detections.pop_back();
-  const AdjustmentResult of_four = run_bundle_adjustment(input);
+  const AdjustmentResult of_four = adjust_bundle(input);
   ASSERT_TRUE(of_four.has_succeeded()) << of_four.undetermined;
   ASSERT_EQ(of_four.lamps.size(), 4U);
   EXPECT_THAT(list_moved_lamps(of_four), testing::IsEmpty());
@@ -157,7 +157,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsFarFromRobustSolutionAreMovedWithoutMaj
     }
     measure(0.02, 0.01);
     for (AdjustmentCapture& capture : input.captures) capture.detections.pop_back();
-    const AdjustmentResult found = run_bundle_adjustment(input);
+    const AdjustmentResult found = adjust_bundle(input);
     ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
     ASSERT_EQ(found.rejected_detections, 0) << sigmas;
     EXPECT_THAT(list_moved_lamps(found), testing::SizeIs(sigmas > 8 ? 2 : 0)) << sigmas;
@@ -168,7 +168,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsFarFromRobustSolutionAreMovedWithoutMaj
 TEST_F(RunBundleAdjustmentOutliers, DetectionsOfMisplacedExactLampAreRejected) {
   input.lamps.lamps[1].position_m.x() += 0.2;
   measure(0.05, 0.03);
-  const AdjustmentResult found = run_bundle_adjustment(input);
+  const AdjustmentResult found = adjust_bundle(input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(found.rejected_detections, 13);
   EXPECT_EQ(found.detections, 51);
@@ -181,7 +181,7 @@ TEST_F(RunBundleAdjustmentOutliers, KnownPositionIsUsedAgainWithoutMovedLamp) {
   input.captures_are_checked = true;
   measure(0.0005, 0.03);
   input.lamps.lamps[0].position_m.x() += 0.08;
-  const AdjustmentResult found = run_bundle_adjustment(input);
+  const AdjustmentResult found = adjust_bundle(input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(list_moved_lamps(found), std::vector<int>{11});
   EXPECT_THAT(list_wrong_positions(found), testing::IsEmpty());
@@ -197,11 +197,11 @@ TEST_F(RunBundleAdjustmentOutliers, WrongAccuratePositionIsRejectedInsteadOfTheO
     capture.known_position->sd_m = 2e-4;
     capture.known_position->xy_m.x() += 0.02;
   }
-  const AdjustmentResult robust = run_bundle_adjustment(survey.input);
+  const AdjustmentResult robust = adjust_bundle(survey.input);
   ASSERT_TRUE(robust.has_succeeded()) << robust.undetermined;
   EXPECT_THAT(list_wrong_positions(robust), testing::ElementsAre("spot-24"));
   survey.input.captures_are_checked = true;
-  const AdjustmentResult plain = run_bundle_adjustment(survey.input);
+  const AdjustmentResult plain = adjust_bundle(survey.input);
   ASSERT_TRUE(plain.has_succeeded()) << plain.undetermined;
   EXPECT_THAT(list_wrong_positions(plain), testing::Not(testing::ElementsAre("spot-24")));
 }
@@ -223,7 +223,7 @@ TEST_F(RunBundleAdjustmentOutliers, KnownPositionIsWrongBeyondFiveSds) {
         if (capture.pivot == "spot-4") place.xy_m += first_m * Eigen::Vector2d(0.6, -0.8);
         if (capture.pivot == "spot-8") *place.z_m += second_m;
       }
-      const AdjustmentResult found = run_bundle_adjustment(survey.input);
+      const AdjustmentResult found = adjust_bundle(survey.input);
       ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
       ASSERT_EQ(found.known_positions.size(), 3U);
       EXPECT_FALSE(found.known_positions[0].is_outlier);
@@ -247,7 +247,7 @@ TEST_F(RunBundleAdjustmentOutliers, DetectionIsOutlierBeyondFourAndAHalfSigmas) 
       survey.input.captures_are_checked = is_checked;
       survey.input.captures[9].detections[6].pixel +=
           sigmas * survey.sigma_px * Eigen::Vector2d(0.6, -0.8);
-      const AdjustmentResult found = run_bundle_adjustment(survey.input);
+      const AdjustmentResult found = adjust_bundle(survey.input);
       ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
       EXPECT_EQ(found.detections + found.rejected_detections, 24 * 8);
       EXPECT_EQ(found.rejected_detections, sigmas > 4.5 ? 1 : 0) << is_checked << sigmas;
@@ -281,11 +281,11 @@ TEST_F(RunBundleAdjustmentOutliers, DetectionIsOutlierBeyondScatterWithoutSigma)
         }
       }
       const double rows = 2 * static_cast<double>(squares_px2.size());
-      const double limit_px = std::sqrt(estimate_robust_variance_2d(squares_px2, rows) *
-                                        compute_squared_outlier_bound_2d(4.5, rows));
+      const double limit_px =
+          std::sqrt(estimate_variance_2d(squares_px2, rows) * compute_outlier_bound_2d(4.5, rows));
       ASSERT_NEAR(limit_px / noise_px, 4.8, 0.6);
       outlier->pixel = true_px + fraction * limit_px * Eigen::Vector2d(0.6, -0.8);
-      const AdjustmentResult found = run_bundle_adjustment(survey.input);
+      const AdjustmentResult found = adjust_bundle(survey.input);
       ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
       EXPECT_EQ(found.rejected_detections, fraction > 1 ? 1 : 0) << fraction << is_checked;
       double sum_px2 = std::accumulate(squares_px2.begin(), squares_px2.end(), 0.0);
@@ -304,7 +304,7 @@ TEST_F(RunBundleAdjustmentOutliers, DetectionOfLampBelowCameraIsRejected) {
   survey.input.lamps.lamps.push_back({9, {0.2, 0.3, -1}, {}, {}, {}, 0.002});
   std::vector<Detection>& detections = survey.input.captures[0].detections;
   detections.insert(detections.begin(), {9, {500, 350}, 0.03});
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(found.rejected_detections, 1);
   EXPECT_EQ(found.detections, 60 * 8);
@@ -318,7 +318,7 @@ TEST_F(RunBundleAdjustmentOutliers, CaptureWithoutInlierCountsAsRejected) {
   detections.resize(2);
   std::swap(detections[0].lamp, detections[1].lamp);
   detections[0].pixel.x() += 40;
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(found.captures, 59);
   EXPECT_EQ(found.rejected_captures, 1);
@@ -347,7 +347,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsOfStronglyTiltedCameraAreFoundAboveHori
       compute_level_from_camera_matrix(truth, Correction::all).transpose() *
       Eigen::Vector3d(-std::cos(0.7), -std::sin(0.7), -0.05);
   first[3].pixel = lens.project_point(below_horizon).value();
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(found.detections, detections - 1);
   EXPECT_EQ(found.rejected_detections, 0);
@@ -362,7 +362,7 @@ TEST_F(RunBundleAdjustmentOutliers, MotionHasNoEffectWithoutRowTime) {
   survey.stand({{0.2, -0.1, 0}, 2.0});
   ASSERT_FALSE(survey.input.calibration.camera.row_time_s);
   survey.input.captures.back().motion = {{0.5, -0.3}, 0.7, 0, 0};
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(found.rejected_detections, 0);
   EXPECT_LT(found.residual_px, 1e-8);
@@ -373,7 +373,7 @@ TEST_F(RunBundleAdjustmentOutliers, CorrectionsOfFreeMapContainNoSimilarity) {
   measure(0.05, 0.03);
   for (AdjustmentCapture& capture : input.captures) capture.known_position.reset();
   input.map_prior = MapPrior::frame;
-  const AdjustmentResult found = run_bundle_adjustment(input);
+  const AdjustmentResult found = adjust_bundle(input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   ASSERT_EQ(found.lamps.size(), 5U);
   Eigen::Vector3d mean_m(0, 0, 0);

@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Compares each field of the result of run_bundle_adjustment() with a dense solution of its
+/// Compares each field of the result of adjust_bundle() with a dense solution of its
 /// equations.
 #include <gmock/gmock.h>
 
@@ -24,7 +24,7 @@ namespace {
 class RunBundleAdjustmentResult : public AdjustmentRoom {
  protected:
   AdjustmentResult adjust(const AdjustmentLimits& limits = {}) const {
-    AdjustmentResult found = run_bundle_adjustment(input, limits);
+    AdjustmentResult found = adjust_bundle(input, limits);
     EXPECT_TRUE(found.has_succeeded()) << found.undetermined;
     EXPECT_EQ(found.refined_covariance.rows(), 31);
     EXPECT_EQ(found.rejected_detections, 0);
@@ -272,13 +272,13 @@ TEST_F(RunBundleAdjustmentResult, LimitsOfZenithAndLeverArmApplyToLargestSd) {
   const double arm_fraction =
       compute_max_sd(found.refined_covariance.block(14, 14, 2, 2)) / found.lamp_height_m;
   constexpr double less = 1 - 1e-5, more = 1 + 1e-5;
-  EXPECT_EQ(run_bundle_adjustment(input, {zenith_sd * more, 1}).undetermined, "");
-  const std::string tilt = run_bundle_adjustment(input, {zenith_sd * less, 1}).undetermined;
+  EXPECT_EQ(adjust_bundle(input, {zenith_sd * more, 1}).undetermined, "");
+  const std::string tilt = adjust_bundle(input, {zenith_sd * less, 1}).undetermined;
   const std::string both =
-      run_bundle_adjustment(input, {zenith_sd * less, arm_fraction * less}).undetermined;
+      adjust_bundle(input, {zenith_sd * less, arm_fraction * less}).undetermined;
   EXPECT_THAT(tilt, testing::Not(testing::AnyOf("", both)));
   EXPECT_NE(both, "");
-  EXPECT_TRUE(run_bundle_adjustment(input, {1, arm_fraction * more}).center.lever_arm_m);
+  EXPECT_TRUE(adjust_bundle(input, {1, arm_fraction * more}).center.lever_arm_m);
   const AdjustmentResult without_arm = adjust({1, arm_fraction * less});
   EXPECT_FALSE(without_arm.center.lever_arm_m);
   EXPECT_EQ(without_arm.center_covariance().rows(), 2);
@@ -290,10 +290,10 @@ TEST_F(RunBundleAdjustmentResult, LimitsOfZenithAndLeverArmApplyToLargestSd) {
 }
 
 /// Derivatives by differences, over the centers of 16 x 16 equal parts of the image.
-TEST(ComputeIntrinsicsCovarianceFromPixelSd, ReturnsVariancesOfEqualImageDisplacement) {
+TEST(MakeIntrinsicsCovariance, ReturnsVariancesOfEqualImageDisplacement) {
   const Camera camera = synthetic_camera();
   const Lens lens(camera.lens_model, camera.intrinsics);
-  const MatrixX found = compute_intrinsics_covariance_from_pixel_sd(camera, 0.5);
+  const MatrixX found = make_intrinsics_covariance(camera, 0.5);
   ASSERT_EQ(found.rows(), 12);
   Eigen::VectorXd squares = Eigen::VectorXd::Zero(12);
   for (int part = 0; part < 256; ++part) {
@@ -315,9 +315,9 @@ TEST(ComputeIntrinsicsCovarianceFromPixelSd, ReturnsVariancesOfEqualImageDisplac
 }
 
 /// Image of zero width at the principal point: fx displaces no pixel.
-TEST(ComputeIntrinsicsCovarianceFromPixelSd, ReturnsZeroForIntrinsicThatDisplacesNoPixel) {
+TEST(MakeIntrinsicsCovariance, ReturnsZeroForIntrinsicThatDisplacesNoPixel) {
   const Camera camera{"", {0, 600}, LensModel::pinhole, {500, 400, -0.5, 299.5}, {}, {}, {}};
-  const MatrixX found = compute_intrinsics_covariance_from_pixel_sd(camera, 3);
+  const MatrixX found = make_intrinsics_covariance(camera, 3);
   ASSERT_EQ(found.rows(), 4);
   EXPECT_EQ(found(0, 0), 0);
   EXPECT_NEAR(found(2, 2), 18, 1e-9);

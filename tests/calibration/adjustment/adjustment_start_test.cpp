@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: The VLP calibration toolbox authors
 // SPDX-License-Identifier: Apache-2.0
-/// Start values of run_bundle_adjustment(), and inputs that determine only some of the unknowns.
+/// Start values of adjust_bundle(), and inputs that determine only some of the unknowns.
 #include <gmock/gmock.h>
 
 #include <Eigen/Core>
@@ -54,7 +54,7 @@ TEST(RunBundleAdjustmentStart, IsFitOfThreeLampsIfOneOfFourIsMisidentified) {
   AdjustmentCapture& capture = survey.input.captures.back();
   keep_lamps_in_order(capture, {8, 7, 5, 1});
   capture.detections[3].lamp = 9;
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(found.rejected_detections, 1);
   EXPECT_EQ(found.detections, 60 * 8 + 3);
@@ -76,7 +76,7 @@ TEST(RunBundleAdjustmentStart, IsFitOfLampsThatAgreeToFractionOfTheirDistances) 
   keep_lamps_in_order(capture, {5, 6, 8, 1, 3});
   std::swap(capture.detections[3].lamp, capture.detections[4].lamp);
   for (std::size_t k = 0; k < 60; ++k) ASSERT_EQ(survey.input.captures[k].detections.size(), 8U);
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(found.rejected_detections, 2);
   EXPECT_EQ(found.captures, 61);
@@ -88,7 +88,7 @@ TEST(RunBundleAdjustmentStart, IsFitOfLampsThatAgreeToFractionOfTheirDistances) 
 TEST(RunBundleAdjustmentStart, NeedsTwoLampsFartherApartThanRootTwoPixels) {
   for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}) {
     AdjustmentInput input = make_input_of_two_lamps(1.3 * direction);
-    const AdjustmentResult near = run_bundle_adjustment(input);
+    const AdjustmentResult near = adjust_bundle(input);
     EXPECT_FALSE(near.has_succeeded());
     EXPECT_EQ(near.rejected_captures, 1);
     EXPECT_EQ(near.captures, 0);
@@ -96,7 +96,7 @@ TEST(RunBundleAdjustmentStart, NeedsTwoLampsFartherApartThanRootTwoPixels) {
     EXPECT_EQ(near.refined_map.lamps.size(), 2U);
     EXPECT_EQ(near.camera.intrinsics, input.calibration.camera.intrinsics);
     input = make_input_of_two_lamps(1.55 * direction);
-    const AdjustmentResult apart = run_bundle_adjustment(input);
+    const AdjustmentResult apart = adjust_bundle(input);
     EXPECT_EQ(apart.rejected_captures, 0);
     EXPECT_EQ(apart.captures, 1);
     EXPECT_EQ(apart.detections, 2);
@@ -107,10 +107,10 @@ TEST(RunBundleAdjustmentStart, NeedsTwoLampsFartherApartThanRootTwoPixels) {
 TEST(RunBundleAdjustmentStart, PivotWithoutFixHasNoEffect) {
   Survey survey;
   survey.five_places(1e-4);
-  const AdjustmentResult without = run_bundle_adjustment(survey.input);
+  const AdjustmentResult without = adjust_bundle(survey.input);
   survey.turn({0.1, 0.2, 0}, 1);
   survey.input.captures.back().detections.resize(1);
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(without.has_succeeded()) << without.undetermined;
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(found.rejected_captures, 1);
@@ -135,7 +135,7 @@ TEST(RunBundleAdjustmentStart, IsExactFarFromOriginOfWorld) {
     capture.known_position->xy_m += shift_m.head<2>();
     *capture.known_position->z_m += shift_m.z();
   }
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   ASSERT_EQ(found.lamps.size(), 8U);
   ASSERT_TRUE(found.center.lever_arm_m);
@@ -157,7 +157,7 @@ TEST(RunBundleAdjustmentStart, UsesCalibratedLeverArm) {
     for (const double z_m : {0.0, 0.2}) survey.turn({x_m, 0.3, z_m}, 2);
     survey.turn({x_m, -0.4, 0.1}, 1);
   }
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   ASSERT_TRUE(found.center.lever_arm_m);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-8));
@@ -173,7 +173,7 @@ TEST(RunBundleAdjustmentStart, AxisPositionsDetermineLeverArmButCameraPositionsD
     survey.turn({0, 0, 0}, 4, 1e-3, point);
     survey.turn({0.3, 0.1, 0.2}, 3, 1e-3, point);
     for (AdjustmentCapture& capture : survey.input.captures) capture.pivot.clear();
-    const AdjustmentResult found = run_bundle_adjustment(survey.input, {0.005, 1e9});
+    const AdjustmentResult found = adjust_bundle(survey.input, {0.005, 1e9});
     ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
     EXPECT_LT(found.residual_px, 1e-6);
     if (point == MeasuredPoint::camera) {
@@ -197,7 +197,7 @@ TEST(RunBundleAdjustmentStart, FailsForKnownPositionThatIsNoNumber) {
     survey.turn({0, 0, 0}, 2, 1e-3);
     survey.input.captures_are_checked = is_checked;
     survey.input.captures[0].known_position->xy_m.x() = std::numeric_limits<double>::quiet_NaN();
-    const AdjustmentResult found = run_bundle_adjustment(survey.input);
+    const AdjustmentResult found = adjust_bundle(survey.input);
     EXPECT_FALSE(found.has_succeeded());
     EXPECT_EQ(found.refined_map.lamps.size(), 8U);
     EXPECT_EQ(found.camera.intrinsics, survey.input.calibration.camera.intrinsics);

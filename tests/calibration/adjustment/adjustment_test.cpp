@@ -20,11 +20,11 @@ std::vector<int> moved_lamps(const AdjustmentResult& result) {
   return ids;
 }
 
-TEST(RunBundleAdjustment, RecoversZenithLeverArmAndLampsExactlyWithoutNoise) {
+TEST(AdjustBundle, RecoversZenithLeverArmAndLampsExactlyWithoutNoise) {
   Survey survey;
   survey.five_places(1e-4);
   survey.stand({{0.2, -0.1, 0}, 2.0});
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_EQ(found.captures, 61);
   EXPECT_THAT(found.center.zenith_in_camera,
@@ -41,13 +41,13 @@ TEST(RunBundleAdjustment, RecoversZenithLeverArmAndLampsExactlyWithoutNoise) {
   EXPECT_TRUE(moved_lamps(found).empty());
 }
 
-TEST(RunBundleAdjustment, ReducesMapErrorsOfMillimetersOrCentimetersToSubmillimeter) {
+TEST(AdjustBundle, ReducesMapErrorsOfMillimetersOrCentimetersToSubmillimeter) {
   for (const double sd_m : {0.002, 0.02}) {
     Random random(3);
     Survey survey(sd_m);
     survey.five_places(1e-4);
     survey.add_noise(random, true, true, true);
-    const AdjustmentResult found = run_bundle_adjustment(survey.input);
+    const AdjustmentResult found = adjust_bundle(survey.input);
     ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
     ASSERT_EQ(found.refined_map.lamps.size(), 8U);
     ASSERT_EQ(found.lamps.size(), 8U);
@@ -66,7 +66,7 @@ TEST(RunBundleAdjustment, ReducesMapErrorsOfMillimetersOrCentimetersToSubmillime
 }
 
 /// Survey with sd 0.5 mm, pixel noise as in real captures.
-TEST(RunBundleAdjustment, ReportsAndRelocatesAnyLampMovedByThreeMillimeters) {
+TEST(AdjustBundle, ReportsAndRelocatesAnyLampMovedByThreeMillimeters) {
   for (std::size_t moved = 0; moved < 8; ++moved) {
     Random random(50 + moved);
     Survey survey(0.0005);
@@ -75,19 +75,19 @@ TEST(RunBundleAdjustment, ReportsAndRelocatesAnyLampMovedByThreeMillimeters) {
     survey.add_noise(random, true, true, true);
     survey.input.lamps.lamps[moved].position_m.head<2>() =
         survey.truth.map.lamps[moved].position_m.head<2>() + Eigen::Vector2d(0.0024, -0.0018);
-    const AdjustmentResult found = run_bundle_adjustment(survey.input);
+    const AdjustmentResult found = adjust_bundle(survey.input);
     ASSERT_TRUE(found.has_succeeded());
     EXPECT_EQ(moved_lamps(found), std::vector<int>{static_cast<int>(moved) + 1});
     EXPECT_THAT(survey.misplaced(moved, found.refined_map), IsNear(Eigen::Vector3d(0, 0, 0), 5e-4));
   }
 }
 
-TEST(RunBundleAdjustment, RecoversAllLampsExactlyWhenOneIsMoved) {
+TEST(AdjustBundle, RecoversAllLampsExactlyWhenOneIsMoved) {
   Survey survey(0.001);
   survey.turn({0, 0, 0}, 12);
   survey.turn({0.3, 0.1, 0.3}, 12);
   survey.input.lamps.lamps[4].position_m += Eigen::Vector3d(0.02, -0.02, 0);
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   ASSERT_EQ(found.refined_map.lamps.size(), 8U);
   EXPECT_EQ(moved_lamps(found), std::vector<int>{5});
@@ -100,36 +100,36 @@ TEST(RunBundleAdjustment, RecoversAllLampsExactlyWhenOneIsMoved) {
                                "scale of the map; captures at 3 more known positions")));
 }
 
-TEST(RunBundleAdjustment, AsksForSecondHeightForOneCaptureOfTwoLampsAndSucceedsWithIt) {
+TEST(AdjustBundle, AsksForSecondHeightForOneCaptureOfTwoLampsAndSucceedsWithIt) {
   Survey survey;
   survey.turn({0, 0, 0}, 1);
   survey.input.captures[0].detections.resize(2);
-  EXPECT_THAT(run_bundle_adjustment(survey.input).undetermined, HasSubstr("a second height"));
+  EXPECT_THAT(adjust_bundle(survey.input).undetermined, HasSubstr("a second height"));
   survey.turn({0, 0, 0.3}, 12);
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   ASSERT_TRUE(found.center.lever_arm_m);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-6));
 }
 
-TEST(RunBundleAdjustment, NotesWhatOneOrTwoKnownPositionsDoNotDetermine) {
+TEST(AdjustBundle, NotesWhatOneOrTwoKnownPositionsDoNotDetermine) {
   Survey survey(0.001);
   survey.turn({0, 0, 0}, 12, 1e-4);
-  EXPECT_THAT(run_bundle_adjustment(survey.input).notes,
+  EXPECT_THAT(adjust_bundle(survey.input).notes,
               testing::Contains("1 known position: only the survey determines yaw and scale of the "
                                 "map; captures at 2 more known positions would determine it"));
   survey.turn({0.5, 0.25, 0}, 12, 1e-4);
-  EXPECT_THAT(run_bundle_adjustment(survey.input).notes,
+  EXPECT_THAT(adjust_bundle(survey.input).notes,
               testing::Contains(HasSubstr("2 known positions: only the survey determines rotation "
                                           "of the map about the line through both positions; "
                                           "captures at 1 more known position")));
   survey.turn({-0.5, 0.25, 0.1}, 12, 1e-4);
-  EXPECT_THAT(run_bundle_adjustment(survey.input).notes,
+  EXPECT_THAT(adjust_bundle(survey.input).notes,
               testing::Not(testing::Contains(HasSubstr("only the survey determines"))));
 }
 
 /// Initial lens of another camera: focal lengths 4 % and 3 % too small, and different distortion.
-TEST(RunBundleAdjustment, RecoversFocalLengthsAndPrincipalPointFromWrongInitialLens) {
+TEST(AdjustBundle, RecoversFocalLengthsAndPrincipalPointFromWrongInitialLens) {
   Random random(8);
   Survey survey(0.002);
   Camera& camera = survey.input.calibration.camera;
@@ -141,9 +141,8 @@ TEST(RunBundleAdjustment, RecoversFocalLengthsAndPrincipalPointFromWrongInitialL
   camera.intrinsics[2] += 5;
   camera.intrinsics[4] += 0.03;
   survey.input.calibration.intrinsics_report.emplace();
-  survey.input.calibration.intrinsics_report->covariance =
-      compute_intrinsics_covariance_from_pixel_sd(camera, 10);
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  survey.input.calibration.intrinsics_report->covariance = make_intrinsics_covariance(camera, 10);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   ASSERT_TRUE(found.center.lever_arm_m);
   ASSERT_EQ(found.lamps.size(), 8U);
@@ -158,26 +157,26 @@ TEST(RunBundleAdjustment, RecoversFocalLengthsAndPrincipalPointFromWrongInitialL
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 2e-4));
 }
 
-TEST(RunBundleAdjustment, RejectsBothDetectionsWithSwappedLampIds) {
+TEST(AdjustBundle, RejectsBothDetectionsWithSwappedLampIds) {
   Survey survey;
   survey.five_places(1e-4);
   std::swap(survey.input.captures[7].detections[0].lamp,
             survey.input.captures[7].detections[3].lamp);
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   ASSERT_TRUE(found.has_succeeded());
   ASSERT_TRUE(found.center.lever_arm_m);
   EXPECT_EQ(found.rejected_detections, 2);
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-7));
 }
 
-TEST(RunBundleAdjustment, ReturnsIdenticalZenithAndCovarianceWhenRepeated) {
+TEST(AdjustBundle, ReturnsIdenticalZenithAndCovarianceWhenRepeated) {
   Random random(5);
   Survey survey(0.002);
   survey.five_places(1e-4);
   survey.add_noise(random, true, true, true);
-  const AdjustmentResult once = run_bundle_adjustment(survey.input);
+  const AdjustmentResult once = adjust_bundle(survey.input);
   const std::vector<double> elsewhere(12345);  // other addresses
-  const AdjustmentResult again = run_bundle_adjustment(survey.input);
+  const AdjustmentResult again = adjust_bundle(survey.input);
   ASSERT_TRUE(once.has_succeeded()) << once.undetermined;
   EXPECT_EQ(once.refined_covariance, again.refined_covariance);
   EXPECT_EQ(once.center.zenith_in_camera, again.center.zenith_in_camera);

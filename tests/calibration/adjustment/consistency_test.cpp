@@ -37,11 +37,10 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   if (the.lens == Case::boards) {
     draw_lens(calibration, lens_covariance(calibration.camera, 0.1, 8), random);
   } else if (the.lens == Case::elsewhere) {
-    draw_lens(calibration, compute_intrinsics_covariance_from_pixel_sd(calibration.camera, 3),
-              random);
+    draw_lens(calibration, make_intrinsics_covariance(calibration.camera, 3), random);
   }
   survey.add_noise(random, true, true, true);
-  const AdjustmentResult found = run_bundle_adjustment(survey.input);
+  const AdjustmentResult found = adjust_bundle(survey.input);
   EXPECT_TRUE(found.has_succeeded()) << found.undetermined;
   const LampMap map = the.refined ? found.refined_map : survey.input.lamps;
   const Adjustment adjustment{{"made up"}, found.captures, found.detections, found.residual_px};
@@ -49,11 +48,10 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
   for (const Lamp& lamp : map.lamps) lamps.push_back({lamp.id, lamp.position_m});
   Calibration result = calibration;
   result.camera = found.camera;
-  return {add_adjustment_to_calibration(
+  return {add_adjustment(
               result, found.center, adjustment,
-              make_adjusted_covariance(
-                  found.camera, lamps,
-                  the.refined ? found.refined_covariance : found.surveyed_covariance),
+              make_covariance(found.camera, lamps,
+                              the.refined ? found.refined_covariance : found.surveyed_covariance),
               {}),
           map};
 }

@@ -39,30 +39,29 @@ AdjustmentInput tracked_drive(const BodyRig& rig, const MovingCaptures& captures
 /// Returns the errors of zenith point and lever arm.
 Eigen::Vector4d compute_error(const AdjustmentResult& found, const BodyRig& rig) {
   Eigen::Vector4d error;
-  error << compute_normalized_zenith_point(found.center) -
-               compute_normalized_zenith_point(*rig.calibration.rotation_center),
+  error << compute_zenith_point(found.center) -
+               compute_zenith_point(*rig.calibration.rotation_center),
       found.center.lever_arm_m.value() - kArm_m;
   return error;
 }
 
-TEST(RunBundleAdjustment, RecoversZenithAndLeverArmExactlyForMovingCamera) {
+TEST(AdjustBundle, RecoversZenithAndLeverArmExactlyForMovingCamera) {
   Random random(1);
   const BodyRig rig = make_tilted_body();
   const MovingCaptures captures = make_moving_captures(rig, 16, 2, random, 1e-3);
-  const AdjustmentResult known =
-      run_bundle_adjustment(tracked_drive(rig, captures, captures.motions));
+  const AdjustmentResult known = adjust_bundle(tracked_drive(rig, captures, captures.motions));
   ASSERT_TRUE(known.has_succeeded()) << known.undetermined;
   ASSERT_TRUE(known.center.lever_arm_m);
   EXPECT_THAT(compute_error(known, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-9));
   EXPECT_LT(known.residual_px, 1e-8);
   const std::vector<KnownMotion> unknown(16, KnownMotion::make_motion_prior_from_limits(1e3, 1e3));
-  const AdjustmentResult found = run_bundle_adjustment(tracked_drive(rig, captures, unknown));
+  const AdjustmentResult found = adjust_bundle(tracked_drive(rig, captures, unknown));
   ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
   EXPECT_THAT(compute_error(found, rig), IsNear(Eigen::Vector4d(0, 0, 0, 0), 1e-8));
 }
 
 /// Rotation in place without stops.
-TEST(RunBundleAdjustment, RecoversZenithAndLeverArmWhileRotatingWithKnownYawRate) {
+TEST(AdjustBundle, RecoversZenithAndLeverArmWhileRotatingWithKnownYawRate) {
   BodyRig rig = make_tilted_body();
   const double rate_rad_per_s = 2;
   const auto turned = [&](double stated_rad_per_s) {
@@ -83,7 +82,7 @@ TEST(RunBundleAdjustment, RecoversZenithAndLeverArmWhileRotatingWithKnownYawRate
         input.captures.push_back(capture);
       }
     }
-    const AdjustmentResult found = run_bundle_adjustment(input);
+    const AdjustmentResult found = adjust_bundle(input);
     EXPECT_TRUE(found.has_succeeded()) << found.undetermined;
     return found;
   };
@@ -93,14 +92,13 @@ TEST(RunBundleAdjustment, RecoversZenithAndLeverArmWhileRotatingWithKnownYawRate
   EXPECT_GT(turned(0).residual_px, 1) << "two degrees from the first row to the last";
 }
 
-TEST(RunBundleAdjustment, ReportsContradictedNoiseWhenMotionIsIgnored) {
+TEST(AdjustBundle, ReportsContradictedNoiseWhenMotionIsIgnored) {
   Random random(2);
   const BodyRig rig = make_tilted_body();
   MovingCaptures captures = make_moving_captures(rig, 16, 1, random, 0.05);
   for (Frame& frame : captures.frames) frame.detections = with_noise(frame.detections, random);
-  const AdjustmentResult known =
-      run_bundle_adjustment(tracked_drive(rig, captures, captures.motions));
-  const AdjustmentResult left_out = run_bundle_adjustment(tracked_drive(rig, captures, {}));
+  const AdjustmentResult known = adjust_bundle(tracked_drive(rig, captures, captures.motions));
+  const AdjustmentResult left_out = adjust_bundle(tracked_drive(rig, captures, {}));
   ASSERT_TRUE(known.has_succeeded() && left_out.has_succeeded());
   EXPECT_FALSE(known.noise_is_contradicted);
   EXPECT_GT(left_out.noise_scale, 5);
@@ -110,7 +108,7 @@ TEST(RunBundleAdjustment, ReportsContradictedNoiseWhenMotionIsIgnored) {
 
 /// Mean normalized squared error e' cov^-1 e of zenith and lever arm per unknown; 60 draws
 /// determine it to 10 %.
-TEST(RunBundleAdjustment, ZenithAndLeverArmErrorsMatchCovarianceForMovingCamera) {
+TEST(AdjustBundle, ZenithAndLeverArmErrorsMatchCovarianceForMovingCamera) {
   constexpr int draws = 60;
   const BodyRig rig = make_tilted_body();
   for (const bool odometry : {true, false}) {
@@ -131,7 +129,7 @@ TEST(RunBundleAdjustment, ZenithAndLeverArmErrorsMatchCovarianceForMovingCamera)
           for (double& one : capture.known_position->xy_m) one += kPlaceSd_m * random.normal();
           *capture.known_position->z_m += kPlaceSd_m * random.normal();
         }
-        const AdjustmentResult found = run_bundle_adjustment(input);
+        const AdjustmentResult found = adjust_bundle(input);
         EXPECT_TRUE(found.has_succeeded() && found.center.lever_arm_m) << found.undetermined;
         const Eigen::Index zenith = std::ssize(rig.calibration.camera.intrinsics);
         const Eigen::Matrix4d covariance = found.refined_covariance.block<4, 4>(zenith, zenith);

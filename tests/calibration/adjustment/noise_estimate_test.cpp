@@ -82,7 +82,7 @@ TEST_P(RunBundleAdjustmentNoise, NoiseAndZenithSdMatchTruthForAnyKnownPositions)
   int count = 0;
   for (int run = 0; run < runs; ++run) {
     const Survey survey = make_survey(variant, random);
-    const AdjustmentResult found = run_bundle_adjustment(survey.input);
+    const AdjustmentResult found = adjust_bundle(survey.input);
     ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
     const auto& truth = *survey.truth.calibration.rotation_center;
     const Matrix2 covariance_px2 = center_covariance_px2(found.center_covariance(), found.camera);

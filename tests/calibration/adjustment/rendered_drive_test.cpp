@@ -34,7 +34,7 @@ class RenderedDriveCalibration : public testing::Test {
     return rig;
   }();
   const Calibration truth = make_true_calibration(scene);
-  const LampMap lamps = make_scene_lamp_map(scene, false);
+  const LampMap lamps = make_lamp_map(scene, false);
 
   struct Drive {
     std::vector<Frame> frames;
@@ -49,8 +49,7 @@ class RenderedDriveCalibration : public testing::Test {
     Random random(5);
     Drive drive;
     for (int i = 0; i < kCaptures; ++i) {
-      LampShot shot = make_lamp_capture_parameters(scene, scene.sets.at(0),
-                                                   static_cast<std::size_t>(i) % kShots);
+      LampShot shot = make_lamp_shot(scene, scene.sets.at(0), static_cast<std::size_t>(i) % kShots);
       BaseMotion& motion = shot.motion;
       motion.axis_m = {random.uniform(-0.3, 0.3), random.uniform(-0.12, 0.12), i % 2 ? 0.3 : 0.0};
       motion.yaw_rad = random.uniform(-3.1, 3.1);
@@ -59,8 +58,8 @@ class RenderedDriveCalibration : public testing::Test {
       motion.velocity_m_per_s =
           speed_m_per_s * Eigen::Vector2d(std::cos(direction_rad), std::sin(direction_rad));
       motion.turn_rate_rad_per_s = speed_m_per_s > 0 ? rate_rad_per_s : 0;
-      const cv::Mat image = simulate_sensor_image(
-          scene.sensor, renderer.render_lamps_in_electrons(shot), shot.noise_seed);
+      const cv::Mat image =
+          simulate_sensor_image(scene.sensor, renderer.render_lamps(shot), shot.noise_seed);
       Frame frame{std::to_string(i), {}};
       for (const Light& light : detector.detect_lights(to_image_view(image))) {
         if (light.kind != LightKind::lamp) continue;
@@ -95,7 +94,7 @@ class RenderedDriveCalibration : public testing::Test {
     TiltCalibrationOptions options;
     options.motions = motions;
     const TiltCalibration found =
-        estimate_camera_tilt_from_lamps(drive.frames, lamps, scene.camera, options);
+        estimate_tilt_from_lamps(drive.frames, lamps, scene.camera, options);
     EXPECT_EQ(found.undetermined, "");
     return {zenith_error(found.center), std::sqrt(found.covariance.trace()), 0, 0};
   }
@@ -111,7 +110,7 @@ class RenderedDriveCalibration : public testing::Test {
       if (!motions.empty()) capture.motion = motions[i];
       input.captures.push_back(capture);
     }
-    const AdjustmentResult found = run_bundle_adjustment(input);
+    const AdjustmentResult found = adjust_bundle(input);
     EXPECT_TRUE(found.has_succeeded() && found.center.lever_arm_m) << found.undetermined;
     if (!found.center.lever_arm_m) return {};
     const MatrixX covariance = found.center_covariance();

@@ -29,7 +29,7 @@ Means over_trials(double map_sd_m, bool places_are_wrong, int trials) {
     Survey survey(map_sd_m);
     survey.five_places(1e-4);
     survey.add_noise(random, true, true, places_are_wrong);
-    const AdjustmentResult found = run_bundle_adjustment(survey.input);
+    const AdjustmentResult found = adjust_bundle(survey.input);
     EXPECT_TRUE(found.has_succeeded()) << found.undetermined;
     Calibration calibration = survey.input.calibration;
     calibration.camera = found.camera;

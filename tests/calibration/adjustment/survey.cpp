@@ -89,7 +89,7 @@ Eigen::MatrixXd lens_covariance(const Camera& camera, double sigma_px, int rays_
                                   camera.imager_px[1] * (j + 0.5) / rays_across);
       const auto ray = lens.unproject_pixel(pixel);
       if (!ray) continue;
-      const auto seen = lens.project_point_with_jacobians(ray->direction);
+      const auto seen = lens.project_with_jacobians(ray->direction);
       if (!seen) continue;
       const Eigen::Vector3d& d = ray->direction;
       Eigen::Matrix3d turned;

@@ -21,8 +21,7 @@ namespace {
 /// Returns the calibration with the dispersion of a fit and its errors.
 Calibration add_dispersion_with_covariance(Calibration calibration, const DispersionFit& fit) {
   calibration.dispersion = fit.dispersion;
-  calibration.covariance =
-      add_offset_to_covariance({}, fit, MatrixX(2, 0), calibration.camera.focal_px());
+  calibration.covariance = append_offset({}, fit, MatrixX(2, 0), calibration.camera.focal_px());
   return calibration;
 }
 
@@ -68,8 +67,7 @@ TEST_P(EstimateDispersionOffsetUncertainty, Offset95PercentIntervalCoversErrorAt
   const Captures& cell = GetParam();
   Station station(0.01);
   const auto exact = make_captures(station, cell);
-  const auto truth =
-      estimate_dispersion_offset(exact, station.rig.map, station.believed, cell.method);
+  const auto truth = estimate_dispersion(exact, station.rig.map, station.believed, cell.method);
   ASSERT_EQ(truth.status, DispersionStatus::ok);
   Random random(44);
   EstimateScatter offset, world;
@@ -90,10 +88,10 @@ TEST_P(EstimateDispersionOffsetUncertainty, Offset95PercentIntervalCoversErrorAt
                                  : std::nullopt;
       }
     }
-    const auto fit = estimate_dispersion_offset(captures, surveyed, station.believed, cell.method);
+    const auto fit = estimate_dispersion(captures, surveyed, station.believed, cell.method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     const auto covariance_px2 =
-        compute_dispersion_offset_covariance(add_dispersion_with_covariance(station.believed, fit));
+        compute_offset_covariance(add_dispersion_with_covariance(station.believed, fit));
     ASSERT_TRUE(covariance_px2);
     offset.add(fit.dispersion.offset_px - truth.dispersion.offset_px, *covariance_px2);
     ASSERT_EQ(fit.world_offset_m.has_value(), cell.method == DispersionMethod::camera);
@@ -116,7 +114,7 @@ TEST_P(EstimateDispersionOffsetUncertainty, Offset95PercentIntervalCoversErrorAt
     EXPECT_LT(offset.correlation_difference().cwiseAbs().maxCoeff(), 0.15);
   }
   // Three captures whose given noise is 1.4 times too small cover 93.2 % on average
-  // (compute_small_sample_variance_factor()). 600 draws of two axes determine this to 0.7 %.
+  // (compute_variance_factor()). 600 draws of two axes determine this to 0.7 %.
   const bool is_understated = cell.stated_ratio.value_or(1) < 1;
   EXPECT_LT(fraction, is_understated ? 0.068 + 2 * 0.007 : 0.05 + 3 * 0.0063);
   EXPECT_GT(fraction, 0.01);
@@ -214,7 +212,7 @@ TEST_P(PositionerAfterDispersion, FixCovarianceMatchesErrorsUnderSameAndOtherLam
   for (int draw = 0; draw < draws; ++draw) {
     const LampMap surveyed = draw_survey(rig.map, random);
     const auto captures = draw_captures(rig, GetParam(), random);
-    const auto fit = estimate_dispersion_offset(captures, surveyed, station.believed, GetParam());
+    const auto fit = estimate_dispersion(captures, surveyed, station.believed, GetParam());
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     ASSERT_EQ(fit.lamp_derivatives.lamps.size(), 8U);
     Calibration calibration = add_dispersion_with_covariance(station.believed, fit);

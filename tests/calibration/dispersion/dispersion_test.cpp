@@ -14,15 +14,15 @@
 namespace vlp {
 namespace {
 
-TEST(EstimateDispersionOffset, CameraMethodRecoversWorldOffsetAndCorrectsFixesExactly) {
+TEST(EstimateDispersion, CameraMethodRecoversWorldOffsetAndCorrectsFixesExactly) {
   Random random(1);
   for (const double error_rad : {0.0, 0.005, 0.05}) {
     Station station(error_rad);
     const Eigen::Vector2d wrong_m(0.004, -0.003);
     const auto captures = station.captures(12, true, wrong_m);
-    const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
-                                                DispersionMethod::camera);
-    ASSERT_EQ(fit.status, DispersionStatus::ok) << describe_dispersion_status(fit.status);
+    const auto fit =
+        estimate_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
+    ASSERT_EQ(fit.status, DispersionStatus::ok) << describe_status(fit.status);
     ASSERT_TRUE(fit.world_offset_m);
     EXPECT_THAT(*fit.world_offset_m, IsNear(wrong_m, 1e-9));
     EXPECT_LT(fit.after.radius, 1e-9);
@@ -43,14 +43,14 @@ TEST(EstimateDispersionOffset, CameraMethodRecoversWorldOffsetAndCorrectsFixesEx
   }
 }
 
-TEST(EstimateDispersionOffset, CameraMethodReturnsPrincipalPointErrorWithoutRotationCenter) {
+TEST(EstimateDispersion, CameraMethodReturnsPrincipalPointErrorWithoutRotationCenter) {
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();
   station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1};
   const auto captures = station.captures(12, true, {0, 0});
-  const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
-                                              DispersionMethod::camera);
+  const auto fit =
+      estimate_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
   ASSERT_EQ(fit.status, DispersionStatus::ok);
   EXPECT_THAT(fit.dispersion.offset_px, IsNear(Eigen::Vector2d(6, -4), 1e-6));
   const double radius_m = 1.6 * std::hypot(6 / 520., 4 / 522.);
@@ -58,7 +58,7 @@ TEST(EstimateDispersionOffset, CameraMethodReturnsPrincipalPointErrorWithoutRota
 }
 
 /// The paper's equations are exact for a shift and lamps of one height, at any yaw.
-TEST(EstimateDispersionOffset, ChenGuanMethodReturnsTrueOffsetAtOneYaw) {
+TEST(EstimateDispersion, ChenGuanMethodReturnsTrueOffsetAtOneYaw) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0);
     station.believed.rotation_center.reset();
@@ -66,8 +66,8 @@ TEST(EstimateDispersionOffset, ChenGuanMethodReturnsTrueOffsetAtOneYaw) {
     station.rig.calibration.dispersion = vlp::Dispersion{{6, -4}, 0, {0, 0}, 1};
     for (const double yaw_rad : {0.0, 2.0, -1.0}) {
       const auto captures = station.captures_at(yaw_rad, 5);
-      const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
-                                                  DispersionMethod::chen_guan, circle);
+      const auto fit = estimate_dispersion(captures, station.rig.map, station.believed,
+                                           DispersionMethod::chen_guan, circle);
       ASSERT_EQ(fit.status, DispersionStatus::ok);
       EXPECT_FALSE(fit.world_offset_m.has_value());
       // Fixes of many lamps have weights by the lens, which depend on the shift.
@@ -79,15 +79,15 @@ TEST(EstimateDispersionOffset, ChenGuanMethodReturnsTrueOffsetAtOneYaw) {
 
 /// After a rotation center of model `tilt` the offset is applied as a rotation. The factor f / H
 /// and the yaw alone would leave 10 % of 16 mm.
-TEST(EstimateDispersionOffset, ChenGuanMethodCentersFixesAtReferencePointIfCameraIsTilted) {
+TEST(EstimateDispersion, ChenGuanMethodCentersFixesAtReferencePointIfCameraIsTilted) {
   for (const DispersionCircle circle : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     Station station(0.01);
     Random random(3);
     for (const double yaw_rad : {0.0, 2.0, -1.0}) {
       auto captures = station.captures_at(yaw_rad, 6);
       for (auto& capture : captures) capture.detections = with_noise(capture.detections, random);
-      const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
-                                                  DispersionMethod::chen_guan, circle);
+      const auto fit = estimate_dispersion(captures, station.rig.map, station.believed,
+                                           DispersionMethod::chen_guan, circle);
       ASSERT_EQ(fit.status, DispersionStatus::ok);
       EXPECT_GT(fit.before.center.norm(), 0.01);
       EXPECT_LT(fit.after.center.norm(), 1e-9);
@@ -95,36 +95,34 @@ TEST(EstimateDispersionOffset, ChenGuanMethodCentersFixesAtReferencePointIfCamer
   }
 }
 
-TEST(EstimateDispersionOffset, ChenGuanMethodAttributesReferencePointErrorToCamera) {
+TEST(EstimateDispersion, ChenGuanMethodAttributesReferencePointErrorToCamera) {
   Station station(0);
   station.believed.rotation_center.reset();
   station.rig.calibration.rotation_center.reset();
   for (const auto& [yaw_rad, sign] : {std::pair(0.0, 1.0), std::pair(M_PI, -1.0)}) {
     auto captures = station.captures_at(yaw_rad, 5);
     for (auto& capture : captures) capture.reference_point_m.x() -= 0.008;
-    const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
-                                                DispersionMethod::chen_guan);
+    const auto fit = estimate_dispersion(captures, station.rig.map, station.believed,
+                                         DispersionMethod::chen_guan);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     EXPECT_NEAR(fit.dispersion.offset_px.x(), -sign * 520 * 0.008 / 1.6, 0.01);
   }
 }
 
-TEST(EstimateDispersionOffset, RejectsQuarterOfCapturesWithReferencePointErrors) {
+TEST(EstimateDispersion, RejectsQuarterOfCapturesWithReferencePointErrors) {
   Station station(0.01);
   Random random(2);
   for (const auto method : {DispersionMethod::camera, DispersionMethod::chen_guan}) {
     auto captures = method == DispersionMethod::camera ? station.captures(40, true, {0, 0})
                                                        : station.captures_at(0.5, 40);
-    const auto clean =
-        estimate_dispersion_offset(captures, station.rig.map, station.believed, method);
+    const auto clean = estimate_dispersion(captures, station.rig.map, station.believed, method);
     ASSERT_EQ(clean.status, DispersionStatus::ok);
     for (std::size_t i = 0; i < 40; ++i) {
       captures[i].detections = with_noise(captures[i].detections, random);
       if (i % 4 == 0)
         captures[i].reference_point_m += Eigen::Vector2d(0.05 + 5e-4 * double(i), -0.05);
     }
-    const auto fit =
-        estimate_dispersion_offset(captures, station.rig.map, station.believed, method);
+    const auto fit = estimate_dispersion(captures, station.rig.map, station.believed, method);
     ASSERT_EQ(fit.status, DispersionStatus::ok);
     ASSERT_TRUE(fit.covariance);
     EXPECT_EQ(fit.dispersion.captures, 30);
@@ -133,22 +131,22 @@ TEST(EstimateDispersionOffset, RejectsQuarterOfCapturesWithReferencePointErrors)
   }
 }
 
-TEST(EstimateDispersionOffset, ReducesFixCircleToZeroWithInclinationSensor) {
+TEST(EstimateDispersion, ReducesFixCircleToZeroWithInclinationSensor) {
   Station station(0.01);
   station.rig.inclination = Inclination{0.04, -0.03};
   auto captures = station.captures(12, true, {0, 0});
   for (auto& capture : captures) capture.inclination = station.rig.inclination;
-  const auto fit = estimate_dispersion_offset(captures, station.rig.map, station.believed,
-                                              DispersionMethod::camera);
+  const auto fit =
+      estimate_dispersion(captures, station.rig.map, station.believed, DispersionMethod::camera);
   ASSERT_EQ(fit.status, DispersionStatus::ok);
   EXPECT_LT(fit.after.radius, 1e-9);
 }
 
-TEST(EstimateDispersionOffset, StatusNamesTooFewCapturesWrongYawsFarReferenceOrOtherMap) {
+TEST(EstimateDispersion, StatusNamesTooFewCapturesWrongYawsFarReferenceOrOtherMap) {
   Station station(0.01);
   const auto find_status = [&](const std::vector<ReferencePointCapture>& captures,
                                DispersionMethod method = DispersionMethod::camera) {
-    return estimate_dispersion_offset(captures, station.rig.map, station.believed, method).status;
+    return estimate_dispersion(captures, station.rig.map, station.believed, method).status;
   };
   const auto turned = station.captures(12, true, {0, 0});
   EXPECT_EQ(find_status({}), DispersionStatus::no_fix);
@@ -181,8 +179,8 @@ TEST(EstimateDispersionOffset, StatusNamesTooFewCapturesWrongYawsFarReferenceOrO
   for (auto& capture : other_map) {
     for (auto& detection : capture.detections) detection.lamp += 50;
   }
-  const auto fit = estimate_dispersion_offset(other_map, station.rig.map, station.believed,
-                                              DispersionMethod::camera);
+  const auto fit =
+      estimate_dispersion(other_map, station.rig.map, station.believed, DispersionMethod::camera);
   EXPECT_EQ(fit.status, DispersionStatus::no_fix);
   EXPECT_EQ(fit.captures_without_fix, 12);
   EXPECT_EQ(fit.no_fix_status, FixStatus::too_few_lamps);

@@ -39,7 +39,7 @@ struct NoisyStation : Station {
   }
   DispersionFit fit(DispersionMethod method,
                     DispersionCircle circle = DispersionCircle::mean) const {
-    return estimate_dispersion_offset(noisy, rig.map, believed, method, circle);
+    return estimate_dispersion(noisy, rig.map, believed, method, circle);
   }
   /// Returns the fix of a capture with this offset.
   Fix compute_fix(const ReferencePointCapture& capture, const Eigen::Vector2d& offset_px) const {
@@ -64,8 +64,8 @@ double compute_student_ratio(double freedom) {
 }
 
 /// Noise as stated, a third of it stated, and none stated. Few captures widen the variance:
-/// compute_small_sample_variance_factor().
-TEST(EstimateDispersionOffset, CameraMethodMatchesDenseSolution) {
+/// compute_variance_factor().
+TEST(EstimateDispersion, CameraMethodMatchesDenseSolution) {
   for (const std::optional<double> sigma_px :
        {std::optional(0.1), std::optional(0.03), std::optional<double>()}) {
     NoisyStation station;
@@ -110,7 +110,7 @@ TEST(EstimateDispersionOffset, CameraMethodMatchesDenseSolution) {
 }
 
 /// Exact captures. Four lamps have uncertain positions.
-TEST(EstimateDispersionOffset, CameraMethodReturnsLampDerivativesAndAddsMapToWorldCovariance) {
+TEST(EstimateDispersion, CameraMethodReturnsLampDerivativesAndAddsMapToWorldCovariance) {
   NoisyStation station;
   station.noisy = station.captures(9, true, {0.004, -0.003}, 0.1);
   const DispersionFit exact_map = station.fit(DispersionMethod::camera);
@@ -143,14 +143,14 @@ TEST(EstimateDispersionOffset, CameraMethodReturnsLampDerivativesAndAddsMapToWor
       lamps, 1e-5);
   EXPECT_THAT(fit.lamp_derivatives.jacobian_wrt_positions, IsNear(jacobian.topRows<2>(), 0.5));
   const Eigen::MatrixXd scaled = jacobian * sds_m.asDiagonal();
-  EXPECT_THAT(fit.lamp_derivatives.scale_jacobian_by_lamp_sds(),
+  EXPECT_THAT(fit.lamp_derivatives.scale_by_lamp_sds(),
               IsNear(fit.lamp_derivatives.jacobian_wrt_positions * sds_m.asDiagonal(), 1e-15));
   const Eigen::MatrixXd map_m2 = scaled.bottomRows<2>() * scaled.bottomRows<2>().transpose();
   expect_relatively_near(fit.world_covariance - exact_map.world_covariance, map_m2, 0.01);
 }
 
 /// Three captures at one yaw, and one that is rejected. One lamp has no sd_m.
-TEST(EstimateDispersionOffset, ChenGuanMethodCentersFixesAndReturnsLampDerivatives) {
+TEST(EstimateDispersion, ChenGuanMethodCentersFixesAndReturnsLampDerivatives) {
   NoisyStation station;
   station.noisy = station.captures_at(0.7, 3, 0.1);
   station.add_noise(53);
@@ -186,12 +186,12 @@ TEST(EstimateDispersionOffset, ChenGuanMethodCentersFixesAndReturnsLampDerivativ
   for (std::size_t i = 0; i < 3; ++i) {
     errors_m.push_back(station.compute_error_m(station.noisy[i], enclosing.dispersion.offset_px));
   }
-  EXPECT_LT(compute_enclosing_circle(errors_m).center.norm(), 1e-9);
+  EXPECT_LT(enclose_in_circle(errors_m).center.norm(), 1e-9);
 }
 
 /// Fixes of two lamps have no residuals, so that only their scatter counts. It includes the
 /// isotropic mean with the weight of three fixes.
-TEST(EstimateDispersionOffset, ChenGuanMethodCovarianceIsThatOfScatterWithoutResiduals) {
+TEST(EstimateDispersion, ChenGuanMethodCovarianceIsThatOfScatterWithoutResiduals) {
   NoisyStation station;
   station.noisy = station.captures_at(0.7, 5, 0.1);
   for (auto& capture : station.noisy) capture.detections.resize(2);
@@ -223,7 +223,7 @@ TEST(EstimateDispersionOffset, ChenGuanMethodCovarianceIsThatOfScatterWithoutRes
 }
 
 /// One capture without a fix and one with a wrong reference point.
-TEST(EstimateDispersionOffset, ReturnsFixesAndCirclesBeforeAndAfterCorrection) {
+TEST(EstimateDispersion, ReturnsFixesAndCirclesBeforeAndAfterCorrection) {
   for (const DispersionCircle kind : {DispersionCircle::mean, DispersionCircle::enclosing}) {
     NoisyStation station;
     station.noisy = station.captures(9, true, {0.004, -0.003}, 0.1);
@@ -252,7 +252,7 @@ TEST(EstimateDispersionOffset, ReturnsFixesAndCirclesBeforeAndAfterCorrection) {
     }
     for (const auto& [points_m, circle] :
          {std::pair(before_m, fit.before), std::pair(after_m, fit.after)}) {
-      Circle expected = compute_enclosing_circle(points_m);
+      Circle expected = enclose_in_circle(points_m);
       if (kind == DispersionCircle::mean) {
         expected = {{0, 0}, 0};
         for (const Eigen::Vector2d& point_m : points_m) expected.center += point_m / 7;
@@ -274,7 +274,7 @@ TEST(DescribeDispersionStatus, DescribesEachStatusDifferently) {
        {DispersionStatus::ok, DispersionStatus::no_fix, DispersionStatus::too_few_captures,
         DispersionStatus::all_far_from_reference, DispersionStatus::single_yaw,
         DispersionStatus::several_yaws, DispersionStatus::diverged}) {
-    EXPECT_TRUE(descriptions.emplace(describe_dispersion_status(status)).second);
+    EXPECT_TRUE(descriptions.emplace(describe_status(status)).second);
   }
 }
 

@@ -321,7 +321,7 @@ TEST(CheckCharucoLayout, ReportsNoProblemForCorrectBoard) {
   }
 }
 
-TEST(CheckCharucoLayout, ReportsSizeOfSquareBeyondFifteenPercent) {
+TEST(CheckCharucoLayout, ReportsSquareToMarkerRatioOffBy15Percent) {
   const auto views = make_flat_views(charuco_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
   struct Stated {
     double marker_m;

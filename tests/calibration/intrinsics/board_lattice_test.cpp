@@ -19,7 +19,7 @@ BoardDetection make_points_of_part(const BoardLattice& lattice, std::size_t part
   BoardDetection seen;
   for (int row = 0; row < rows; ++row) {
     for (int col = 0; col < cols; ++col) {
-      seen.points.push_back({part * lattice.num_points_per_part() +
+      seen.points.push_back({part * lattice.points_per_part() +
                                  static_cast<std::size_t>(row * lattice.lattice_cols() + col),
                              {10. * col, 10. * row}});
     }
@@ -30,13 +30,13 @@ BoardDetection make_points_of_part(const BoardLattice& lattice, std::size_t part
 TEST(BoardLattice, TwelvePointsInTwoRowsDeterminePoseOfBoardInOnePart) {
   const BoardLattice lattice(synthetic_board(false));
   ASSERT_EQ(lattice.num_board_parts(), 1U);
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(make_points_of_part(lattice, 0, 6, 2)));
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(make_points_of_part(lattice, 0, 2, 6)));
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(make_points_of_part(lattice, 0, 1, 9)));
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(make_points_of_part(lattice, 0, 12, 1)));
+  EXPECT_TRUE(lattice.can_determine_pose(make_points_of_part(lattice, 0, 6, 2)));
+  EXPECT_TRUE(lattice.can_determine_pose(make_points_of_part(lattice, 0, 2, 6)));
+  EXPECT_FALSE(lattice.can_determine_pose(make_points_of_part(lattice, 0, 1, 9)));
+  EXPECT_FALSE(lattice.can_determine_pose(make_points_of_part(lattice, 0, 12, 1)));
   BoardDetection eleven = make_points_of_part(lattice, 0, 6, 2);
   eleven.points.pop_back();
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(eleven));
+  EXPECT_FALSE(lattice.can_determine_pose(eleven));
 }
 
 TEST(BoardLattice, SixPointsOfEachPartDeterminePoseOfBoardInFourParts) {
@@ -44,13 +44,13 @@ TEST(BoardLattice, SixPointsOfEachPartDeterminePoseOfBoardInFourParts) {
   ASSERT_EQ(lattice.num_board_parts(), 4U);
   BoardDetection seen;
   for (std::size_t part = 0; part < 4; ++part) {
-    EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(seen)) << "part " << part << " is missing";
+    EXPECT_FALSE(lattice.can_determine_pose(seen)) << "part " << part << " is missing";
     const BoardDetection more = make_points_of_part(lattice, part, 3, 2);
     seen.points.insert(seen.points.end(), more.points.begin(), more.points.end());
   }
-  EXPECT_TRUE(lattice.are_corners_sufficient_for_pose(seen));
+  EXPECT_TRUE(lattice.can_determine_pose(seen));
   seen.points.pop_back();
-  EXPECT_FALSE(lattice.are_corners_sufficient_for_pose(seen));
+  EXPECT_FALSE(lattice.can_determine_pose(seen));
 }
 
 /// Board of 4 x 3 tags of 20 mm with gaps of 5 mm, and ids from 7 at the top left along columns.
@@ -78,15 +78,15 @@ TEST(BoardLattice, DimensionsOfBoardInOnePart) {
   EXPECT_EQ(lattice.num_board_parts(), 1U);
   EXPECT_EQ(lattice.lattice_cols(), 12);
   EXPECT_EQ(lattice.lattice_rows(), 10);
-  EXPECT_EQ(lattice.num_points_per_part(), 120U);
+  EXPECT_EQ(lattice.points_per_part(), 120U);
   EXPECT_DOUBLE_EQ(lattice.point_spacing_m(), 0.02);
   EXPECT_NEAR(lattice.board_to_part_warp_ratio().x(), 1, 1e-12);
   EXPECT_NEAR(lattice.board_to_part_warp_ratio().y(), 1, 1e-12);
-  EXPECT_EQ(lattice.find_tag_index_of_point(0), 0U);
-  EXPECT_EQ(lattice.find_tag_index_of_point(11), 5U);
-  EXPECT_EQ(lattice.find_tag_index_of_point(13), 0U);
-  EXPECT_EQ(lattice.find_tag_index_of_point(3 * 12 + 5), 8U) << "row 1, column 2";
-  EXPECT_EQ(lattice.find_tag_index_of_point(119), 29U);
+  EXPECT_EQ(lattice.get_tag_of_point(0), 0U);
+  EXPECT_EQ(lattice.get_tag_of_point(11), 5U);
+  EXPECT_EQ(lattice.get_tag_of_point(13), 0U);
+  EXPECT_EQ(lattice.get_tag_of_point(3 * 12 + 5), 8U) << "row 1, column 2";
+  EXPECT_EQ(lattice.get_tag_of_point(119), 29U);
 }
 
 TEST(BoardLattice, DimensionsOfBoardInFourParts) {
@@ -98,8 +98,8 @@ TEST(BoardLattice, DimensionsOfBoardInFourParts) {
   // The board is 95 x 70 mm, a part 75 x 50 mm.
   EXPECT_NEAR(lattice.board_to_part_warp_ratio().x(), std::pow(95 / 75.0, 2), 1e-12);
   EXPECT_NEAR(lattice.board_to_part_warp_ratio().y(), std::pow(70 / 50.0, 2), 1e-12);
-  EXPECT_EQ(lattice.point_index_on_board(2, 5), 29U);
-  EXPECT_EQ(lattice.find_tag_index_of_point(7), 7U);
+  EXPECT_EQ(lattice.board_point_index(2, 5), 29U);
+  EXPECT_EQ(lattice.get_tag_of_point(7), 7U);
 }
 
 TEST(BoardLattice, ThrowsForSingleRowOrColumnOfSpacedTags) {
@@ -137,7 +137,7 @@ TEST(BoardLattice, ListsCornersOfTagsOfBoardInOnePart) {
   const Board board = synthetic_board(false);  // ids from the bottom left along rows
   const BoardLattice lattice(board);
   const TagDetection tag = make_tag_with_all_fields(8, {{{10, 90}, {50, 90}, {50, 20}, {10, 20}}});
-  const auto corners = lattice.list_corners_with_board_positions({{tag}});
+  const auto corners = lattice.list_corners({{tag}});
   ASSERT_EQ(corners.size(), 4U);
   // Tag 8: column 2 of row 3 from the top.
   const std::array<std::size_t, 4> points{7 * 12 + 4, 7 * 12 + 5, 6 * 12 + 5, 6 * 12 + 4};
@@ -165,8 +165,7 @@ TEST(BoardLattice, InwardDisplacementMovesBothEdgesOfObliqueTagByOnePixel) {
     if (mirrored) {
       for (auto& corner : tag.corners_px) corner.x() = 100 - corner.x();
     }
-    const auto corners =
-        BoardLattice(synthetic_board(false)).list_corners_with_board_positions({{tag}});
+    const auto corners = BoardLattice(synthetic_board(false)).list_corners({{tag}});
     ASSERT_EQ(corners.size(), 4U);
     const Eigen::Vector2d middle_px =
         (tag.corners_px[0] + tag.corners_px[1] + tag.corners_px[2] + tag.corners_px[3]) / 4;
@@ -187,7 +186,7 @@ TEST(BoardLattice, ListsPointsOfBoardOfSquares) {
   const BoardLattice lattice(squares_board());
   BoardDetection seen;
   seen.points = {{9, {30, 40}, 0.02, 0.5}, {34, {50, 60}}};
-  const auto corners = lattice.list_corners_with_board_positions(seen);
+  const auto corners = lattice.list_corners(seen);
   ASSERT_EQ(corners.size(), 2U);
   EXPECT_EQ(corners[0].part, 0U);
   EXPECT_EQ(corners[0].point, 9U);

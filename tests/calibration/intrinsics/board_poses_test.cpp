@@ -24,8 +24,8 @@ std::vector<BoardLattice::Corner> project_board(const Lens& lens, const BoardPos
   for (int row = 0; row < 4; ++row) {
     for (int col = 0; col < 6; ++col) {
       const Eigen::Vector3d in_board_m(0.03 * col, 0.03 * row, 0);
-      const auto pixel = lens.project_point(
-          rotation_matrix_from_rotation_vector(pose.rotation) * in_board_m + pose.translation_m);
+      const auto pixel =
+          lens.project_point(rotation_from_vector(pose.rotation) * in_board_m + pose.translation_m);
       if (pixel) corners.push_back({in_board_m, *pixel, 0, corners.size()});
     }
   }
@@ -37,7 +37,7 @@ double compute_weighted_squares(const std::vector<BoardLattice::Corner>& corners
   double squares = 0;
   for (const auto& corner : corners) {
     const Eigen::Vector2d pixel =
-        lens.project_point(rotation_matrix_from_rotation_vector(pose.rotation) * corner.in_board_m +
+        lens.project_point(rotation_from_vector(pose.rotation) * corner.in_board_m +
                            pose.translation_m)
             .value();
     squares += std::pow(corner.weight, 2) * (pixel - corner.pixel).squaredNorm();
@@ -45,13 +45,13 @@ double compute_weighted_squares(const std::vector<BoardLattice::Corner>& corners
   return squares;
 }
 
-TEST(EstimateBoardViewPose, ReturnsExactPoseForExactCorners) {
+TEST(EstimateViewPose, ReturnsExactPoseForExactCorners) {
   for (const BoardPose& truth : {BoardPose{{0.5, -0.3, 0.8}, {-0.05, 0.02, 0.4}},
                                  {{-0.6, 0.1, -2}, {0.05, 0.06, 0.5}},
                                  {{0.1, 0.7, 0.2}, {-0.1, -0.1, 0.6}}}) {
     const auto corners = project_board(synthetic_lens(), truth);
     ASSERT_EQ(corners.size(), 24U);
-    const auto pose = estimate_board_view_pose(corners, synthetic_lens());
+    const auto pose = estimate_view_pose(corners, synthetic_lens());
     ASSERT_TRUE(pose);
     EXPECT_THAT(pose->camera_from_board.rotation, IsNear(truth.rotation, 1e-7));
     EXPECT_THAT(pose->camera_from_board.translation_m, IsNear(truth.translation_m, 1e-8));
@@ -59,7 +59,7 @@ TEST(EstimateBoardViewPose, ReturnsExactPoseForExactCorners) {
   }
 }
 
-TEST(EstimateBoardViewPose, ReturnsExactPoseOfBoardBesideFisheyeLens) {
+TEST(EstimateViewPose, ReturnsExactPoseOfBoardBesideFisheyeLens) {
   const Eigen::Matrix3d towards =
       Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitZ()).toRotationMatrix() *
       Eigen::AngleAxisd(1.4, Eigen::Vector3d::UnitY()) *
@@ -69,13 +69,13 @@ TEST(EstimateBoardViewPose, ReturnsExactPoseOfBoardBesideFisheyeLens) {
                         towards * Eigen::Vector3d(-0.07, -0.04, 0.3)};
   const auto corners = project_board(wide_lens(), truth);
   ASSERT_EQ(corners.size(), 24U);
-  const auto pose = estimate_board_view_pose(corners, wide_lens());
+  const auto pose = estimate_view_pose(corners, wide_lens());
   ASSERT_TRUE(pose);
   EXPECT_THAT(pose->camera_from_board.rotation, IsNear(truth.rotation, 1e-7));
   EXPECT_THAT(pose->camera_from_board.translation_m, IsNear(truth.translation_m, 1e-8));
 }
 
-TEST(EstimateBoardViewPose, MinimizesWeightedSquaresAndReturnsTheirRms) {
+TEST(EstimateViewPose, MinimizesWeightedSquaresAndReturnsTheirRms) {
   const Lens lens = synthetic_lens();
   auto corners = project_board(lens, {{0.5, -0.3, 0.8}, {-0.05, 0.02, 0.4}});
   ASSERT_EQ(corners.size(), 24U);
@@ -85,7 +85,7 @@ TEST(EstimateBoardViewPose, MinimizesWeightedSquaresAndReturnsTheirRms) {
     const double v = random.normal(), u = random.normal();
     corners[i].pixel += Eigen::Vector2d(u, v) / corners[i].weight;
   }
-  const auto pose = estimate_board_view_pose(corners, lens);
+  const auto pose = estimate_view_pose(corners, lens);
   ASSERT_TRUE(pose);
   const double squares = compute_weighted_squares(corners, lens, pose->camera_from_board);
   EXPECT_NEAR(pose->rms_px, std::sqrt(squares / 48), 1e-9);
@@ -99,26 +99,26 @@ TEST(EstimateBoardViewPose, MinimizesWeightedSquaresAndReturnsTheirRms) {
   }
 }
 
-TEST(EstimateBoardViewPose, NeedsFourCornersWithRay) {
+TEST(EstimateViewPose, NeedsFourCornersWithRay) {
   const Lens lens = wide_lens();
   const auto all = project_board(lens, {{0.5, -0.3, 0.8}, {-0.05, 0.02, 0.4}});
   ASSERT_EQ(all.size(), 24U);
   std::vector<BoardLattice::Corner> corners{all[0], all[4], all[15], all[20]};
-  EXPECT_TRUE(estimate_board_view_pose(corners, lens));
+  EXPECT_TRUE(estimate_view_pose(corners, lens));
   const std::vector<BoardLattice::Corner> three(corners.begin(), corners.end() - 1);
-  EXPECT_FALSE(estimate_board_view_pose(three, lens));
-  EXPECT_FALSE(estimate_board_view_pose({}, lens));
+  EXPECT_FALSE(estimate_view_pose(three, lens));
+  EXPECT_FALSE(estimate_view_pose({}, lens));
   ASSERT_FALSE(lens.unproject_pixel({1e4, 1e4}));
   corners[1].pixel = {1e4, 1e4};
-  EXPECT_FALSE(estimate_board_view_pose(corners, lens));
+  EXPECT_FALSE(estimate_view_pose(corners, lens));
 }
 
-TEST(EstimateInitialBoardPoses, ReturnsInfiniteRmsForViewWithoutPose) {
+TEST(EstimateBoardPoses, ReturnsInfiniteRmsForViewWithoutPose) {
   const BoardPose first{{0.5, -0.3, 0.8}, {-0.05, 0.02, 0.4}},
       last{{-0.6, 0.1, -2}, {0.05, 0.06, 0.5}};
   IntrinsicsInput input{BoardLattice(synthetic_board(false)), {}, {800, 600}, LensModel::opencv8};
   input.views = {project_board(synthetic_lens(), first), {}, project_board(synthetic_lens(), last)};
-  const InitialPoses found = estimate_initial_board_poses(input, synthetic_lens());
+  const InitialPoses found = estimate_board_poses(input, synthetic_lens());
   ASSERT_EQ(found.poses.size(), 3U);
   ASSERT_EQ(found.rms_px.size(), 3U);
   EXPECT_THAT(found.poses[0].translation_m, IsNear(first.translation_m, 1e-8));

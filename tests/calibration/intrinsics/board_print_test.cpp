@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kPrintSd = 5e-4;
 
-class ComputeBoardAspectErrorEffectOnLens : public testing::TestWithParam<bool> {};
+class EstimateAspectEffect : public testing::TestWithParam<bool> {};
 
 /// Returns the solution from views of a board that is wider than stated by this factor, with
 /// exact corners.
@@ -28,14 +28,14 @@ IntrinsicsSolution solve_stretched(bool kalibr, double factor) {
 }
 
 /// Compares full solves with a wider board and with the board as stated.
-TEST_P(ComputeBoardAspectErrorEffectOnLens, MatchesNegativeLensChangeOfSolveWithWiderBoard) {
+TEST_P(EstimateAspectEffect, MatchesNegativeLensChangeOfSolveWithWiderBoard) {
   const IntrinsicsSolution stated = solve_stretched(GetParam(), 1);
   const IntrinsicsSolution wider = solve_stretched(GetParam(), 1 + std::sqrt(2) * kPrintSd);
   ASSERT_TRUE(stated.has_succeeded() && wider.has_succeeded());
-  const auto effect = compute_board_aspect_error_effect_on_lens(stated, kPrintSd);
+  const auto effect = estimate_aspect_effect(stated, kPrintSd);
   ASSERT_TRUE(effect);
   const auto expected =
-      compute_projection_difference(stated.fitted_lens(), wider.fitted_lens(), {800, 600}, even);
+      compare_projections(stated.fitted_lens(), wider.fitted_lens(), {800, 600}, even);
   ASSERT_TRUE(expected);
   EXPECT_GT(expected->rms_px, 0.01);
   // A full solve also estimates the shift of the edges, which a board that is wider changes.
@@ -61,8 +61,7 @@ TEST(EstimateLens, ReportedUncertaintyIncludesBoardPrintError) {
     views.stretch = {1 + kPrintSd * random.normal(), 1 + kPrintSd * random.normal()};
     const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, noise_px));
     ASSERT_TRUE(solution.has_succeeded());
-    const auto error =
-        compute_projection_difference(solution.fitted_lens(), views.lens, {800, 600}, even);
+    const auto error = compare_projections(solution.fitted_lens(), views.lens, {800, 600}, even);
     ASSERT_TRUE(error);
     squares += error->worst_px * error->worst_px / draws;
   }
@@ -84,7 +83,7 @@ TEST(EstimateLens, ReportedUncertaintyIncludesBoardPrintError) {
   EXPECT_GT(with_print.report.uncertainty_mean_px, exact.report.uncertainty_mean_px);
 }
 
-INSTANTIATE_TEST_SUITE_P(Boards, ComputeBoardAspectErrorEffectOnLens, testing::Bool(),
+INSTANTIATE_TEST_SUITE_P(Boards, EstimateAspectEffect, testing::Bool(),
                          [](const auto& board) { return board.param ? "Kalibr" : "Plain"; });
 
 }  // namespace

@@ -32,8 +32,7 @@ BoardProblem make_problem_beside_minimum(LensModel lens_model, int num_views) {
 }
 
 double compute_max_residual_difference_px(const BoardProblem& a, const BoardProblem& b) {
-  const auto residuals_a = compute_reprojection_residuals(a),
-             residuals_b = compute_reprojection_residuals(b);
+  const auto residuals_a = compute_board_residuals(a), residuals_b = compute_board_residuals(b);
   if (residuals_a.size() != residuals_b.size()) return std::numeric_limits<double>::infinity();
   double max_px = 0;
   for (std::size_t i = 0; i < residuals_a.size(); ++i) {
@@ -45,19 +44,19 @@ double compute_max_residual_difference_px(const BoardProblem& a, const BoardProb
   return max_px;
 }
 
-class SolveIntermediateBoardProblem : public testing::TestWithParam<LensModel> {};
+class SolveStage : public testing::TestWithParam<LensModel> {};
 
-TEST_P(SolveIntermediateBoardProblem, ReachesMinimumOfFinalSolve) {
+TEST_P(SolveStage, ReachesMinimumOfFinalSolve) {
   const BoardProblem start = make_problem_beside_minimum(GetParam(), 12);
   ASSERT_FALSE(start.intrinsics.empty());
   BoardProblem intermediate = start, final = start;
-  ASSERT_TRUE(solve_intermediate_board_problem(intermediate, kLens));
+  ASSERT_TRUE(solve_stage(intermediate, kLens));
   ASSERT_TRUE(solve_board_problem(final, kLens));
   EXPECT_GT(compute_max_residual_difference_px(start, final), 1);
   EXPECT_LT(compute_max_residual_difference_px(intermediate, final), 0.001);
   EXPECT_NE(intermediate.intrinsics, final.intrinsics) << "not by Ceres with a larger tolerance";
 }
-INSTANTIATE_TEST_SUITE_P(Models, SolveIntermediateBoardProblem,
+INSTANTIATE_TEST_SUITE_P(Models, SolveStage,
                          testing::Values(LensModel::opencv4, LensModel::opencv8,
                                          LensModel::stereographic, LensModel::fisheye),
                          [](const auto& model) {
@@ -67,15 +66,15 @@ INSTANTIATE_TEST_SUITE_P(Models, SolveIntermediateBoardProblem,
                          });
 
 /// Few corners hardly determine the rational distortion of OPENCV8: the regularization does.
-TEST(SolveBoardProblemByCeres, RegularizesDistortionsLikeMrcal) {
+TEST(SolveByCeres, RegularizesDistortionsLikeMrcal) {
   BoardProblem start = make_problem_beside_minimum(LensModel::opencv8, 3);
   ASSERT_FALSE(start.intrinsics.empty());
   for (std::size_t i = 0; i < start.points.size(); ++i) {
     if (i % 4 != 0) start.points[i].z() = BoardProblem::kUnseen;
   }
   BoardProblem by_ceres = start, by_mrcal = start;
-  ASSERT_TRUE(solve_board_problem_by_ceres(by_ceres, kLens));
-  ASSERT_TRUE(solve_board_problem_by_mrcal(by_mrcal, kLens));
+  ASSERT_TRUE(solve_by_ceres(by_ceres, kLens));
+  ASSERT_TRUE(solve_by_mrcal(by_mrcal, kLens));
   ASSERT_EQ(by_ceres.intrinsics.size(), by_mrcal.intrinsics.size());
   for (std::size_t i = 0; i < by_mrcal.intrinsics.size(); ++i)
     EXPECT_NEAR(by_ceres.intrinsics[i], by_mrcal.intrinsics[i], i < 4 ? 0.01 : 0.001) << i;
@@ -112,8 +111,8 @@ BoardProblem make_exact_problem(LensModel model = LensModel::fisheye) {
                    {{-0.5, -0.4, 0.1}, {-0.15, 0.0, 0.28}}};
   const Lens lens(model, problem.intrinsics);
   for (const BoardPose& pose : problem.poses) {
-    for (std::size_t i = 0; i < problem.num_points_per_board(); ++i) {
-      const auto pixel = lens.project_point(rotation_matrix_from_rotation_vector(pose.rotation) *
+    for (std::size_t i = 0; i < problem.points_per_board(); ++i) {
+      const auto pixel = lens.project_point(rotation_from_vector(pose.rotation) *
                                                 compute_warped_point(problem, i) +
                                             pose.translation_m);
       problem.points.emplace_back(pixel.value().x(), pixel.value().y(), 1);
@@ -203,10 +202,10 @@ Eigen::VectorXd compute_weighted_residuals(const BoardProblem& problem) {
   const Lens lens(problem.lens_model, problem.intrinsics);
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     if (!(problem.points[i].z() > 0)) continue;
-    const BoardPose& pose = problem.poses[i / problem.num_points_per_board()];
+    const BoardPose& pose = problem.poses[i / problem.points_per_board()];
     const auto pixel =
-        lens.project_point(rotation_matrix_from_rotation_vector(pose.rotation) *
-                               compute_warped_point(problem, i % problem.num_points_per_board()) +
+        lens.project_point(rotation_from_vector(pose.rotation) *
+                               compute_warped_point(problem, i % problem.points_per_board()) +
                            pose.translation_m);
     residuals.segment<2>(static_cast<Eigen::Index>(2 * i)) =
         problem.points[i].z() * (pixel.value() - problem.points[i].head<2>());
@@ -214,11 +213,11 @@ Eigen::VectorXd compute_weighted_residuals(const BoardProblem& problem) {
   return residuals;
 }
 
-TEST(LinearizeBoardProblemAnalytically, MatchesDifferenceQuotients) {
+TEST(LinearizeAnalytically, MatchesDifferenceQuotients) {
   const BoardProblem problem = make_problem_to_linearize(LensModel::fisheye);
   for (const bool warp : {false, true}) {
-    const Linearization at = linearize_board_problem_analytically(
-        problem, {.core = true, .distortions = true, .warp = warp});
+    const Linearization at =
+        linearize_analytically(problem, {.core = true, .distortions = true, .warp = warp});
     const std::size_t states = 8 + 6 * 4 + (warp ? 2 : 0);
     ASSERT_EQ(at.jacobian_transposed.rows(), static_cast<Eigen::Index>(states));
     ASSERT_EQ(at.jacobian_transposed.cols(), 640);
@@ -247,7 +246,7 @@ TEST(LinearizeBoardProblem, MatchesMrcalForOpencv8) {
   const BoardProblem problem = make_problem_to_linearize(LensModel::opencv8);
   const SolveOptions options{.core = true, .distortions = true, .warp = true};
   const Linearization by_mrcal = linearize_board_problem(problem, options),
-                      analytic = linearize_board_problem_analytically(problem, options);
+                      analytic = linearize_analytically(problem, options);
   EXPECT_GT(by_mrcal.regularization.size(), 0);
   ASSERT_EQ(by_mrcal.poses, analytic.poses);
   ASSERT_EQ(by_mrcal.residuals_px.size(), analytic.residuals_px.size());
@@ -263,14 +262,14 @@ TEST(LinearizeBoardProblem, MatchesMrcalForOpencv8) {
   EXPECT_EQ(linearize_board_problem(make_exact_problem(), options).regularization.size(), 0);
 }
 
-TEST(ComputeReprojectionResiduals, ReturnsMeasuredMinusProjected) {
+TEST(ComputeBoardResiduals, ReturnsMeasuredMinusProjected) {
   BoardProblem problem = make_exact_problem();
   for (std::size_t i = 0; i < problem.points.size(); ++i) {
     problem.points[i].head<2>() += Eigen::Vector2d(0.01 * static_cast<double>(i), -0.5);
     problem.points[i].z() = i % 3 == 0 ? -2 : 3;
   }
   problem.points[100].z() = BoardProblem::kUnseen;
-  const auto residuals = compute_reprojection_residuals(problem);
+  const auto residuals = compute_board_residuals(problem);
   ASSERT_EQ(residuals.size(), 320U);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (i == 100) {

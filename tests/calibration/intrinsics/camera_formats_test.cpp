@@ -123,11 +123,11 @@ constexpr LensModel kOfOpencv[] = {LensModel::pinhole, LensModel::opencv4,  Lens
 /// cv::fisheye divides by the depth.
 constexpr double kOpencvsWidest_deg = 89.9;
 
-TEST(FormatOpencvCamera, ExportedCameraProjectsToSamePixelsInOpencv) {
+TEST(FormatOpencv, ExportedCameraProjectsToSamePixelsInOpencv) {
   for (const LensModel model : kOfOpencv) {
     const Camera camera = make_camera(model);
     const auto points = points_before(camera, kOpencvsWidest_deg);
-    const CvCamera read = read_by_opencv(format_opencv_camera(camera));
+    const CvCamera read = read_by_opencv(format_opencv(camera));
     expect_same_pixels(camera, points,
                        projected_by_opencv(read, model == LensModel::fisheye, points));
   }
@@ -136,7 +136,7 @@ TEST(FormatOpencvCamera, ExportedCameraProjectsToSamePixelsInOpencv) {
 class ReadCameraFormats : public testing::Test {
  protected:
   ImportedCamera read(const std::string& text) const {
-    return read_camera_of_any_format(folder_.file("camera.txt", text));
+    return read_any_camera(folder_.file("camera.txt", text));
   }
   std::string refusal(const std::string& text) const {
     return rejection_message([&] { read(text); });
@@ -198,7 +198,7 @@ TEST_F(ReadCameraFormats, CameraExportedToRosFileMatchesProjectionOfOpencv) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
                                 LensModel::opencv8, LensModel::fisheye}) {
     const Camera camera = make_camera(model);
-    const std::string text = format_ros_camera_info(camera);
+    const std::string text = format_ros(camera);
     expect_same_pixels(camera, YAML::Load(text));
     expect_same_pixels(read(text).camera, YAML::Load(text));
   }
@@ -238,7 +238,7 @@ TEST_F(ReadCameraFormats, CameraReadFromRosFileMatchesProjectionOfOpencv) {
 TEST_F(ReadCameraFormats, CameraExportedToKalibrFileMatchesProjectionOfOpencv) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::fisheye}) {
     const Camera camera = make_camera(model);
-    const std::string text = format_kalibr_camchain(camera);
+    const std::string text = format_camchain(camera);
     expect_same_pixels(camera, YAML::Load(text)["cam0"]);
     expect_same_pixels(read(text).camera, YAML::Load(text)["cam0"]);
   }
@@ -312,7 +312,7 @@ class MrcalCameramodel : public ReadCameraFormats {
   ImportedCamera written_by_mrcal(const std::string& text) const {
     printed(folder_.file("ours.cameramodel", text),
             "m.write(at('theirs.cameramodel'), note = \"of 'lensmodel': 'LENSMODEL_CAHVOR'\")\n");
-    return read_camera_of_any_format(folder_ / "theirs.cameramodel");
+    return read_any_camera(folder_ / "theirs.cameramodel");
   }
 };
 
@@ -324,7 +324,7 @@ TEST_F(MrcalCameramodel, KeepsProjectionAndIntrinsicsAfterRoundTripThroughMrcal)
   }
   for (const Camera& camera : cameras) {
     SCOPED_TRACE(lens_model_name(camera.lens_model));
-    const std::string text = format_mrcal_cameramodel(camera);
+    const std::string text = format_cameramodel(camera);
     const auto points = points_before(camera);
     expect_same_pixels(camera, points, projected_by_mrcal(text, points));
     const auto [back, region] = written_by_mrcal(text);
@@ -349,11 +349,11 @@ TEST_F(MrcalCameramodel, WritesValidRegionOfSolutionReadableByMrcal) {
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.has_succeeded());
   const auto file = folder_ / "camera.cameramodel";
-  const ImageRegion expected = compute_valid_lens_region(
-      collect_inlier_corner_pixels(solution.problem), input.imager_px, solution.fitted_lens());
-  write_mrcal_cameramodel(file, solution, expected);
+  const ImageRegion expected = make_valid_region(list_inlier_pixels(solution.problem),
+                                                 input.imager_px, solution.fitted_lens());
+  write_cameramodel(file, solution, expected);
   ASSERT_GT(expected.size(), 4U);
-  EXPECT_LT(compute_region_fraction_of_image_area(expected, input.imager_px), 0.8);
+  EXPECT_LT(compute_area_fraction(expected, input.imager_px), 0.8);
 
   ImageRegion mrcals;
   std::istringstream numbers(printed(
@@ -364,10 +364,9 @@ TEST_F(MrcalCameramodel, WritesValidRegionOfSolutionReadableByMrcal) {
   mrcals.pop_back();
   EXPECT_EQ(mrcals, expected);
 
-  const ImportedCamera ours = read_camera_of_any_format(file);
+  const ImportedCamera ours = read_any_camera(file);
   EXPECT_EQ(ours.region, expected);
-  const ImportedCamera theirs =
-      written_by_mrcal(format_mrcal_cameramodel(ours.camera, ours.region));
+  const ImportedCamera theirs = written_by_mrcal(format_cameramodel(ours.camera, ours.region));
   ASSERT_EQ(theirs.region.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     EXPECT_THAT(theirs.region[i], IsNear(expected[i], 1e-6));  // it writes 10 digits
@@ -377,7 +376,7 @@ TEST_F(MrcalCameramodel, WritesValidRegionOfSolutionReadableByMrcal) {
 TEST_F(ReadCameraFormats, ReturnsValidRegionOfCameramodelAndRejectsMalformedRegions) {
   const Camera camera = make_camera(LensModel::opencv8);
   const ImageRegion bent{{10, 20}, {700, 15.5}, {420, 300}, {700, 590}, {12, 580}};
-  const std::string text = format_mrcal_cameramodel(camera, bent);
+  const std::string text = format_cameramodel(camera, bent);
   EXPECT_EQ(read(text).region, bent);
   const std::string key = "'valid_intrinsics_region': ";
   const std::size_t from = text.find(key) + key.size(), to = text.find("]],") + 2;
@@ -392,22 +391,21 @@ TEST_F(ReadCameraFormats, ReturnsValidRegionOfCameramodelAndRejectsMalformedRegi
 
 // Fits
 
-TEST(ConvertCameraToLensModel, ReportsLargestPixelDifferenceBetweenBothLenses) {
+TEST(ConvertLensModel, ReportsLargestPixelDifferenceBetweenBothLenses) {
   struct Fit {
     Camera from;
     LensModel to;
   };
-  const Fit fits[] = {
-      {make_camera(LensModel::opencv8), LensModel::fisheye},
-      {make_camera(LensModel::opencv12), LensModel::opencv4},
-      {make_camera(LensModel::opencv5), LensModel::pinhole},
-      {make_camera(LensModel::fisheye), lens_model_for_spline_grid({3, 20, 16, 190})},
-      {make_camera(LensModel::fisheye), lens_model_for_spline_grid({2, 12, 10, 170})},
-      {splined_camera(), LensModel::fisheye}};
+  const Fit fits[] = {{make_camera(LensModel::opencv8), LensModel::fisheye},
+                      {make_camera(LensModel::opencv12), LensModel::opencv4},
+                      {make_camera(LensModel::opencv5), LensModel::pinhole},
+                      {make_camera(LensModel::fisheye), splined_lens_model({3, 20, 16, 190})},
+                      {make_camera(LensModel::fisheye), splined_lens_model({2, 12, 10, 170})},
+                      {splined_camera(), LensModel::fisheye}};
   for (const auto& [from, to] : fits) {
     SCOPED_TRACE(testing::Message()
                  << lens_model_name(from.lens_model) << " " << lens_model_name(to));
-    const FittedCamera fitted = convert_camera_to_lens_model(from, to);
+    const FittedCamera fitted = convert_lens_model(from, to);
     const Lens lens = make_lens(fitted.camera), was = make_lens(from);
     Random random(6);
     double worst = 0;

@@ -22,12 +22,12 @@
 namespace vlp {
 namespace {
 
-class ReadCameraOfAnyFormat : public testing::Test {
+class ReadAnyCamera : public testing::Test {
  protected:
   const TemporaryFolder folder_;
 
   void comes_back(const Camera& camera, const std::string& text, LensModel as) const {
-    const Camera back = read_camera_of_any_format(folder_.file("camera.txt", text)).camera;
+    const Camera back = read_any_camera(folder_.file("camera.txt", text)).camera;
     EXPECT_EQ(back.lens_model, as);
     EXPECT_EQ(back.imager_px, camera.imager_px);
     std::vector<double> expected = camera.intrinsics;
@@ -36,7 +36,7 @@ class ReadCameraOfAnyFormat : public testing::Test {
   }
   std::string refusal(const std::string& text) const {
     try {
-      read_camera_of_any_format(folder_.file("camera.txt", text));
+      read_any_camera(folder_.file("camera.txt", text));
     } catch (const InputError& error) {
       return error.what();
     }
@@ -44,61 +44,60 @@ class ReadCameraOfAnyFormat : public testing::Test {
   }
 };
 
-TEST_F(ReadCameraOfAnyFormat, ReturnsExportedCameraExactlyFromEachFormat) {
+TEST_F(ReadAnyCamera, ReturnsExportedCameraExactlyFromEachFormat) {
   for (const LensModel model : {LensModel::pinhole, LensModel::opencv4, LensModel::opencv5,
                                 LensModel::opencv8, LensModel::opencv12, LensModel::fisheye}) {
     const Camera camera = make_camera(model);
-    comes_back(camera, format_opencv_camera(camera), model);
-    if (model != LensModel::fisheye) comes_back(camera, format_mrcal_cameramodel(camera), model);
+    comes_back(camera, format_opencv(camera), model);
+    if (model != LensModel::fisheye) comes_back(camera, format_cameramodel(camera), model);
     if (model == LensModel::opencv12) continue;
     const bool five = model == LensModel::opencv4;  // ROS writes k3, too
-    comes_back(camera, format_ros_camera_info(camera), five ? LensModel::opencv5 : model);
+    comes_back(camera, format_ros(camera), five ? LensModel::opencv5 : model);
     if (model == LensModel::opencv5 || model == LensModel::opencv8) continue;
-    comes_back(camera, format_kalibr_camchain(camera), model);
+    comes_back(camera, format_camchain(camera), model);
   }
 }
 
-TEST_F(ReadCameraOfAnyFormat, ReturnsSplinedLensExactlyFromCameramodelTheOnlyFormatForIt) {
+TEST_F(ReadAnyCamera, ReturnsSplinedLensExactlyFromCameramodelTheOnlyFormatForIt) {
   const Camera camera = splined_camera();
-  comes_back(camera, format_mrcal_cameramodel(camera), camera.lens_model);
-  for (const auto& format_camera :
-       {format_ros_camera_info, format_kalibr_camchain, format_opencv_camera}) {
+  comes_back(camera, format_cameramodel(camera), camera.lens_model);
+  for (const auto& format_camera : {format_ros, format_camchain, format_opencv}) {
     EXPECT_THROW(format_camera(camera), std::invalid_argument);
   }
-  std::string short_one = format_mrcal_cameramodel(camera);
+  std::string short_one = format_cameramodel(camera);
   short_one.replace(short_one.find("Nx=13"), 5, "Nx=14");
   EXPECT_THAT(refusal(short_one), testing::HasSubstr("takes 312 parameters, not 290"));
 }
 
-TEST(ConvertCameraToLensModel, ConvertsFisheyeToSplinedLensAndBackWithinFiveMillipixels) {
-  const auto wide = convert_camera_to_lens_model(make_camera(LensModel::fisheye),
-                                                 lens_model_for_spline_grid({3, 20, 16, 190}));
+TEST(ConvertLensModel, ConvertsFisheyeToSplinedLensAndBackWithinFiveMillipixels) {
+  const auto wide =
+      convert_lens_model(make_camera(LensModel::fisheye), splined_lens_model({3, 20, 16, 190}));
   EXPECT_LT(wide.worst_px, 0.002);
   EXPECT_EQ(wide.common_fraction, 1);
   // The rays outside the grid do not count.
-  const auto part = convert_camera_to_lens_model(make_camera(LensModel::fisheye),
-                                                 lens_model_for_spline_grid({3, 14, 12, 100}));
+  const auto part =
+      convert_lens_model(make_camera(LensModel::fisheye), splined_lens_model({3, 14, 12, 100}));
   EXPECT_LT(part.worst_px, 0.01);
   EXPECT_LT(part.common_fraction, 0.8);
-  const auto back = convert_camera_to_lens_model(wide.camera, LensModel::fisheye);
+  const auto back = convert_lens_model(wide.camera, LensModel::fisheye);
   EXPECT_LT(back.worst_px, 0.005);
   for (std::size_t i = 0; i < 4; ++i) {
     EXPECT_NEAR(back.camera.intrinsics[i], make_camera(LensModel::fisheye).intrinsics[i], 0.01);
   }
-  const auto near = convert_camera_to_lens_model(make_camera(LensModel::opencv8),
-                                                 lens_model_for_spline_grid({2, 20, 16, 100}));
+  const auto near =
+      convert_lens_model(make_camera(LensModel::opencv8), splined_lens_model({2, 20, 16, 100}));
   EXPECT_LT(near.worst_px, 0.2);  // quadratic pieces
 }
 
 /// Lenses of 10 degrees, with no, one or a few rays of a piece in the image, and of a strip with
 /// one row of pieces. The recommended model has to fit.
-TEST(ConvertCameraToLensModel, ThrowsRecommendingFittingGridWhenGridIsTooCoarse) {
+TEST(ConvertLensModel, ThrowsRecommendingFittingGridWhenGridIsTooCoarse) {
   const auto expect_other = [](const Camera& camera, const SplineGrid& grid) {
-    const std::string words = "the control points of " + splined_lens_model_name(grid) +
-                              " do not cover the field of view, ";
+    const std::string words =
+        "the control points of " + splined_lens_name(grid) + " do not cover the field of view, ";
     std::string message;
     try {
-      convert_camera_to_lens_model(camera, lens_model_for_spline_grid(grid));
+      convert_lens_model(camera, splined_lens_model(grid));
     } catch (const std::invalid_argument& error) {
       message = error.what();
     }
@@ -106,7 +105,7 @@ TEST(ConvertCameraToLensModel, ThrowsRecommendingFittingGridWhenGridIsTooCoarse)
     const auto model =
         lens_model_from_name(message.substr(message.find("LENSMODEL", words.size())));
     ASSERT_TRUE(model) << message;
-    const FittedCamera fitted = convert_camera_to_lens_model(camera, *model);
+    const FittedCamera fitted = convert_lens_model(camera, *model);
     EXPECT_LT(fitted.worst_px, 0.01) << message;
     EXPECT_EQ(fitted.common_fraction, 1) << message;
   };
@@ -123,7 +122,7 @@ TEST(ConvertCameraToLensModel, ThrowsRecommendingFittingGridWhenGridIsTooCoarse)
 }
 
 /// Comments as in Python: from a # outside strings to the end of the line.
-TEST_F(ReadCameraOfAnyFormat, IgnoresCommentsInCameramodel) {
+TEST_F(ReadAnyCamera, IgnoresCommentsInCameramodel) {
   const std::string text =
       "# 'lensmodel': 'LENSMODEL_OPENCV4'\n"
       "{ 'made_by': 'camera #3, \\'left\\'', 'lensmodel': 'LENSMODEL_PINHOLE', # isn't \"wide\"\n"
@@ -135,22 +134,18 @@ TEST_F(ReadCameraOfAnyFormat, IgnoresCommentsInCameramodel) {
              text, LensModel::pinhole);
 }
 
-TEST(ConvertCameraToLensModel, IsExactOnlyIfTargetModelIncludesSourceModel) {
+TEST(ConvertLensModel, IsExactOnlyIfTargetModelIncludesSourceModel) {
   // A model that includes the other fits exactly, another one approximately.
-  const auto exact =
-      convert_camera_to_lens_model(make_camera(LensModel::opencv4), LensModel::opencv8);
+  const auto exact = convert_lens_model(make_camera(LensModel::opencv4), LensModel::opencv8);
   EXPECT_LT(exact.worst_px, 1e-6);
   EXPECT_EQ(exact.common_fraction, 1);
-  const auto near =
-      convert_camera_to_lens_model(make_camera(LensModel::opencv8), LensModel::fisheye);
+  const auto near = convert_lens_model(make_camera(LensModel::opencv8), LensModel::fisheye);
   EXPECT_LT(near.worst_px, 1);
   EXPECT_GT(near.worst_px, 1e-6);
-  const auto same =
-      convert_camera_to_lens_model(make_camera(LensModel::opencv8), LensModel::opencv8);
+  const auto same = convert_lens_model(make_camera(LensModel::opencv8), LensModel::opencv8);
   EXPECT_EQ(same.camera.intrinsics, make_camera(LensModel::opencv8).intrinsics);
   // Perspective models have no rays beyond 90 degrees.
-  const auto half =
-      convert_camera_to_lens_model(make_camera(LensModel::fisheye), LensModel::opencv4);
+  const auto half = convert_lens_model(make_camera(LensModel::fisheye), LensModel::opencv4);
   EXPECT_LT(half.common_fraction, 1);
 }
 
@@ -163,20 +158,20 @@ std::string cameramodel_with(const std::string& imagersize, const std::string& i
 
 const Camera kPinhole{"camera", {800, 600}, LensModel::pinhole, {520, 521, 402, 297}, {}, {}, {}};
 
-TEST_F(ReadCameraOfAnyFormat, ReadsCameramodelWithAnyBracketsQuotesAndBlanks) {
+TEST_F(ReadAnyCamera, ReadsCameramodelWithAnyBracketsQuotesAndBlanks) {
   comes_back(kPinhole, cameramodel_with("(800,600)", "\t\r\n((520), [521, 402], 297)"),
              LensModel::pinhole);
   comes_back(kPinhole,
              "{\"lensmodel\" \t: \"LENSMODEL_PINHOLE\",'imagersize'\n:\n[ 800, 600 ],"
              "\"intrinsics\":[520,521,402,297]}",
              LensModel::pinhole);
-  const ImportedCamera read = read_camera_of_any_format(
-      folder_.file("a", cameramodel_with("[800, 600]", "[520, 521, 402, 297]")));
+  const ImportedCamera read =
+      read_any_camera(folder_.file("a", cameramodel_with("[800, 600]", "[520, 521, 402, 297]")));
   EXPECT_EQ(read.camera.id, "camera");
   EXPECT_TRUE(read.region.empty());
 }
 
-TEST_F(ReadCameraOfAnyFormat, ReadsOpenOrClosedRegionOfThreePixelsOrMore) {
+TEST_F(ReadAnyCamera, ReadsOpenOrClosedRegionOfThreePixelsOrMore) {
   const auto with_region = [](const std::string& region) {
     return cameramodel_with("[800, 600]", "[520, 521, 402, 297]",
                             ", 'valid_intrinsics_region': " + region);
@@ -184,7 +179,7 @@ TEST_F(ReadCameraOfAnyFormat, ReadsOpenOrClosedRegionOfThreePixelsOrMore) {
   const ImageRegion three{{1, 2}, {300, 4}, {30, 400}};
   for (const char* const region :
        {"[[1, 2], [300, 4], [30, 400]]", "[[1, 2], [300, 4], [30, 400], [1, 2]]"}) {
-    EXPECT_EQ(read_camera_of_any_format(folder_.file("a", with_region(region))).region, three);
+    EXPECT_EQ(read_any_camera(folder_.file("a", with_region(region))).region, three);
   }
   for (const char* const region : {"[[1, 2], [300, 4]]", "[[1, 2], [300, 4], [1, 2]]",
                                    "[[1, 2], [300, 4], [30, 400], [1]]", "[1]"}) {
@@ -205,7 +200,7 @@ std::string opencv_text(const std::string& distortions, const std::string& other
          distortions + "}\n" + others;
 }
 
-TEST_F(ReadCameraOfAnyFormat, NumberOfYamlDistortionsDeterminesLensModel) {
+TEST_F(ReadAnyCamera, NumberOfYamlDistortionsDeterminesLensModel) {
   struct Expected {
     std::string distortions;
     LensModel model;
@@ -218,8 +213,7 @@ TEST_F(ReadCameraOfAnyFormat, NumberOfYamlDistortionsDeterminesLensModel) {
         Expected{"[1, 2, 3, 4, 5, 6, 7, 8]", LensModel::opencv8, 8},
         Expected{"[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]", LensModel::opencv12, 12},
         Expected{"[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 0, 0]", LensModel::opencv12, 12}}) {
-    const Camera camera =
-        read_camera_of_any_format(folder_.file("a.yaml", opencv_text(distortions))).camera;
+    const Camera camera = read_any_camera(folder_.file("a.yaml", opencv_text(distortions))).camera;
     EXPECT_EQ(camera.lens_model, model) << distortions;
     ASSERT_EQ(camera.intrinsics.size(), 4 + count);
     EXPECT_EQ(std::vector<double>(camera.intrinsics.begin(), camera.intrinsics.begin() + 4),
@@ -238,10 +232,9 @@ TEST_F(ReadCameraOfAnyFormat, NumberOfYamlDistortionsDeterminesLensModel) {
   }
 }
 
-TEST_F(ReadCameraOfAnyFormat, ReadsYamlDistortionModelAndName) {
+TEST_F(ReadAnyCamera, ReadsYamlDistortionModelAndName) {
   const auto read = [&](const std::string& others) {
-    return read_camera_of_any_format(folder_.file("a.yaml", opencv_text("[1, 2, 3, 4]", others)))
-        .camera;
+    return read_any_camera(folder_.file("a.yaml", opencv_text("[1, 2, 3, 4]", others))).camera;
   };
   EXPECT_EQ(read("").lens_model, LensModel::opencv4);
   for (const char* const name : {"plumb_bob", "rational_polynomial", "radtan", "none"}) {
@@ -262,7 +255,7 @@ TEST_F(ReadCameraOfAnyFormat, ReadsYamlDistortionModelAndName) {
               testing::EndsWith("there is no distortion model like thin_prism here"));
 }
 
-TEST_F(ReadCameraOfAnyFormat, ReadsKalibrCameraWithAndWithoutDistortions) {
+TEST_F(ReadAnyCamera, ReadsKalibrCameraWithAndWithoutDistortions) {
   const std::string head =
       "cam0:\n  camera_model: pinhole\n  intrinsics: [520, 521, 402, 297]\n"
       "  resolution: [800, 600]\n";
@@ -277,7 +270,7 @@ TEST_F(ReadCameraOfAnyFormat, ReadsKalibrCameraWithAndWithoutDistortions) {
               testing::EndsWith("camera_model omni is not supported; use pinhole"));
 }
 
-TEST_F(ReadCameraOfAnyFormat, ReadsCameraAndRegionOfCalibration) {
+TEST_F(ReadAnyCamera, ReadsCameraAndRegionOfCalibration) {
   Calibration calibration;
   calibration.camera = make_camera(LensModel::opencv8);
   calibration.camera.id = "left";
@@ -288,33 +281,33 @@ TEST_F(ReadCameraOfAnyFormat, ReadsCameraAndRegionOfCalibration) {
     }
     const auto file = folder_ / "calibration.yaml";
     write_calibration(file, calibration);
-    const ImportedCamera read = read_camera_of_any_format(file);
+    const ImportedCamera read = read_any_camera(file);
     EXPECT_EQ(read.camera.id, "left");
     EXPECT_EQ(read.camera.intrinsics, calibration.camera.intrinsics);
     EXPECT_EQ(read.region, has_report ? calibration.intrinsics_report->region_px : ImageRegion());
   }
 }
 
-TEST(ConvertCameraToLensModel, ThrowsIfNoRayIsInFrontOfPinhole) {
+TEST(ConvertLensModel, ThrowsIfNoRayIsInFrontOfPinhole) {
   // All pixels are more than 90 degrees from the axis.
   const Camera behind{
       "camera", {300, 200}, LensModel::fisheye, {100, 100, -170, 100, 0, 0, 0, 0}, {}, {}, {}};
   ASSERT_TRUE(Lens(behind.lens_model, behind.intrinsics).unproject_pixel({0, 100}));
   std::string message;
   try {
-    convert_camera_to_lens_model(behind, LensModel::pinhole);
+    convert_lens_model(behind, LensModel::pinhole);
   } catch (const std::invalid_argument& error) {
     message = error.what();
   }
   EXPECT_EQ(message, "LENSMODEL_PINHOLE has no lens near OPENCV_FISHEYE");
 }
 
-TEST_F(ReadCameraOfAnyFormat, RejectsOtherTextsNamingTheEntry) {
+TEST_F(ReadAnyCamera, RejectsOtherTextsNamingTheEntry) {
   const std::string core = "[520, 521, 402, 297]", yaml = opencv_text("[1, 2, 3, 4]");
   const auto replaced = [&](const std::string& from, const std::string& to) {
     return std::string(yaml).replace(yaml.find(from), from.size(), to);
   };
-  std::string skewed = format_opencv_camera(make_camera(LensModel::opencv5));
+  std::string skewed = format_opencv(make_camera(LensModel::opencv5));
   skewed.replace(skewed.find("[520.25, 0,"), 11, "[520.25, 3,");
   constexpr std::size_t limit = 1 << 20;
   std::vector<std::pair<std::string, std::string>> refusals{

@@ -12,7 +12,7 @@ namespace vlp {
 namespace {
 
 /// Points of a board of tags, as in mrcal's files, have the ids of the same corners of tags.
-TEST(ConvertCornersToLamps, GivesPointsIdsOfTagCorners) {
+TEST(MakeCornerLamps, GivesPointsIdsOfTagCorners) {
   for (const bool kalibr : {false, true}) {
     const SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
     const BoardLattice lattice(views.board);
@@ -21,11 +21,11 @@ TEST(ConvertCornersToLamps, GivesPointsIdsOfTagCorners) {
     ASSERT_GE(tags.tags.size(), 3U);
     tags.tags[0].corner_sds_px = {0.01, 0.02, 0, 0.04};
     BoardDetection points;
-    for (const auto& corner : lattice.list_corners_with_board_positions(tags))
+    for (const auto& corner : lattice.list_corners(tags))
       points.points.push_back(
-          {lattice.point_index_on_board(corner.part, corner.point), corner.pixel, 0, 0.5});
+          {lattice.board_point_index(corner.part, corner.point), corner.pixel, 0, 0.5});
     const std::vector<BoardView> seen{{"tags", {800, 600}, tags}, {"points", {800, 600}, points}};
-    const CornerLamps lamps = convert_corners_to_lamps(seen, views.board, 0.1, 0.001);
+    const CornerLamps lamps = make_corner_lamps(seen, views.board, 0.1, 0.001);
     ASSERT_EQ(lamps.frames.size(), 2U);
     const auto& first = lamps.frames[0].detections;
     const auto& second = lamps.frames[1].detections;
@@ -54,7 +54,7 @@ TEST(EstimateCornerNoisePx, ReturnsNoiseOfViews) {
   Random random(4);
   std::vector<std::vector<BoardLattice::Corner>> seen;
   for (int i = 0; i < 20; ++i)
-    seen.push_back(lattice.list_corners_with_board_positions(views.random_view(random, noise_px)));
+    seen.push_back(lattice.list_corners(views.random_view(random, noise_px)));
   EXPECT_NEAR(estimate_corner_noise_px(seen).value(), noise_px, 0.15 * noise_px);
   for (auto& corners : seen) {
     for (auto& corner : corners) corner.weight = 0.5;

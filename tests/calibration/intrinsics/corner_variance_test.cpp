@@ -19,7 +19,7 @@ std::vector<CornerError> simulate_errors(const CornerVariance& truth, Random& ra
   std::vector<CornerError> errors;
   for (int i = 0; i < 4000; ++i) {
     const double sd_px = 0.01 * std::pow(10, random.uniform(0, 1));
-    const double unweighted_rms_px = std::sqrt(truth.corner_variance_px2(sd_px));
+    const double unweighted_rms_px = std::sqrt(truth.variance_px2(sd_px));
     const Eigen::Vector2d residual =
         unweighted_rms_px * Eigen::Vector2d{random.normal(), random.normal()};
     errors.push_back({residual.squaredNorm() / 2, sd_px});
@@ -32,11 +32,9 @@ TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceOfSimulatedCorners) {
   for (const auto& [rest_px, scale] :
        {std::pair{0.02, 1.2}, {0.0, 1.0}, {0.05, 0.0}, {0.2, 1.0}, {0.005, 2.0}}) {
     const CornerVariance truth{rest_px * rest_px, scale * scale};
-    const CornerVariance found =
-        estimate_corner_variance_floor_and_scale(simulate_errors(truth, random));
+    const CornerVariance found = fit_corner_variance(simulate_errors(truth, random));
     for (const double sd_px : {0.01, 0.03, 0.1}) {
-      EXPECT_NEAR(std::sqrt(found.corner_variance_px2(sd_px) / truth.corner_variance_px2(sd_px)), 1,
-                  0.08)
+      EXPECT_NEAR(std::sqrt(found.variance_px2(sd_px) / truth.variance_px2(sd_px)), 1, 0.08)
           << rest_px << " " << scale << " " << sd_px;
     }
   }
@@ -47,10 +45,9 @@ TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceWithOnePercentOutliers
   const CornerVariance truth{1e-4, 1};
   auto errors = simulate_errors(truth, random);
   for (std::size_t i = 0; i < errors.size(); i += 100) errors[i].square_px2 = 4;
-  const CornerVariance found = estimate_corner_variance_floor_and_scale(errors);
+  const CornerVariance found = fit_corner_variance(errors);
   for (const double sd_px : {0.01, 0.1}) {
-    EXPECT_NEAR(std::sqrt(found.corner_variance_px2(sd_px) / truth.corner_variance_px2(sd_px)), 1,
-                0.15);
+    EXPECT_NEAR(std::sqrt(found.variance_px2(sd_px) / truth.variance_px2(sd_px)), 1, 0.15);
   }
 }
 
@@ -59,7 +56,7 @@ TEST(EstimateCornerVarianceComponents, ReturnsExactFloorAndScaleForExactSquares)
   std::vector<CornerError> errors;
   for (const double sd_px : {0.01, 0.02, 0.04, 0.05, 0.08})
     errors.push_back({floor_px2 + scale2 * sd_px * sd_px, sd_px});
-  const CornerVariance found = estimate_corner_variance_floor_and_scale(errors);
+  const CornerVariance found = fit_corner_variance(errors);
   EXPECT_NEAR(found.floor_px2, floor_px2, 1e-12);
   EXPECT_NEAR(found.scale2, scale2, 1e-9);
 }
@@ -91,7 +88,7 @@ TEST(CornerWeights, KnownCornerSdsReduceProjectionErrorOfSolve) {
       const IntrinsicsSolution solution = solve_intrinsics(input);
       EXPECT_TRUE(solution.has_succeeded());
       const auto difference =
-          compute_projection_difference(views.lens, solution.fitted_lens(), views.imager_px, even);
+          compare_projections(views.lens, solution.fitted_lens(), views.imager_px, even);
       return std::pow(difference.value().rms_px, 2);
     };
     known_px2 += square_px2();
@@ -120,8 +117,8 @@ TEST(CornerWeights, SolvedLensHardlyChangesByErroneousCornersWithoutSd) {
   const IntrinsicsSolution with = solve_intrinsics(input);
   ASSERT_TRUE(without.has_succeeded() && with.has_succeeded());
   EXPECT_LT(with.outliers, without.outliers + unknown / 4);
-  const auto apart = compute_projection_difference(without.fitted_lens(), with.fitted_lens(),
-                                                   views.imager_px, even);
+  const auto apart =
+      compare_projections(without.fitted_lens(), with.fitted_lens(), views.imager_px, even);
   ASSERT_TRUE(apart);
   EXPECT_LT(apart->rms_px, 0.02);
 }

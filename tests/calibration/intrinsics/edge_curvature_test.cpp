@@ -84,30 +84,30 @@ Tag tag_with_errors(const std::array<double, 4>& error_px) {
   return tag;
 }
 
-TEST(CorrectCornersForEdgeCurvature, RemovesCornerErrorsCausedByCurvatureErrors) {
+TEST(CorrectCurvature, RemovesCornerErrorsCausedByCurvatureErrors) {
   for (const std::array<double, 4> errors_px :
        {std::array{0.0, 0.0, 0.0, 0.0}, {0.1, 0.0, 0.0, 0.0}, {0.06, -0.1, 0.03, 0.08}}) {
     Tag tag = tag_with_errors(errors_px);
-    correct_corners_for_edge_curvature(tag.seen, synthetic_lens());
+    correct_curvature(tag.seen, synthetic_lens());
     for (std::size_t k = 0; k < 4; ++k) {
       // The errors rotate the chords.
       EXPECT_LT((tag.seen[k].pixel - tag.truth[k]).norm(), 1e-3);
     }
     // The corners now have the curvature of the lens.
-    EXPECT_LT(correct_corners_for_edge_curvature(tag.seen, synthetic_lens()), 1e-3);
+    EXPECT_LT(correct_curvature(tag.seen, synthetic_lens()), 1e-3);
   }
 }
 
-TEST(CorrectCornersForEdgeCurvature, KeepsCornersOfTagWithUnmeasuredEdgeCurvature) {
+TEST(CorrectCurvature, KeepsCornersOfTagWithUnmeasuredEdgeCurvature) {
   Tag tag = tag_with_errors({0.1, 0.1, 0.1, 0.1});
   tag.seen[2].curvature.reach = 0;
   const auto before = tag.seen;
-  EXPECT_EQ(correct_corners_for_edge_curvature(tag.seen, synthetic_lens()), 0);
+  EXPECT_EQ(correct_curvature(tag.seen, synthetic_lens()), 0);
   for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ(tag.seen[k].pixel, before[k].pixel);
 }
 
 /// Above all the noise of the position of a tag as a whole.
-TEST(CorrectCornersForEdgeCurvature, ReducesCornerErrorsOfRenderedBoardByQuarter) {
+TEST(CorrectCurvature, ReducesCornerErrorsOfRenderedBoardByQuarter) {
   const Scene scene = read_scene_file(VLP_SOURCE_DIR "/datasets/paper-rig/scene.yaml");
   const CaptureSet views = *std::ranges::find(scene.sets, "boards", &CaptureSet::folder);
   const FrameRenderer renderer(scene);
@@ -118,15 +118,14 @@ TEST(CorrectCornersForEdgeCurvature, ReducesCornerErrorsOfRenderedBoardByQuarter
   double stated = 0;
   std::size_t corners = 0;
   for (std::size_t index = 0; index < 8; ++index) {
-    const BoardShot shot = make_board_capture_parameters(scene, views, index);
+    const BoardShot shot = make_board_shot(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
-    for (const auto& [tag, corner, pixel] :
-         project_scene_corners_into_image(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] : list_true_corners(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
     const BoardDetection seen = detector.detect_board(
-        simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), index));
-    auto all = lattice.list_corners_with_board_positions(seen);
+        simulate_sensor_image(scene.sensor, renderer.render_board(shot), index));
+    auto all = lattice.list_corners(seen);
     for (const std::size_t pass : {0U, 1U}) {
       for (std::size_t i = 0; i < seen.tags.size(); ++i) {
         Eigen::Vector2d sum(0, 0);
@@ -137,7 +136,7 @@ TEST(CorrectCornersForEdgeCurvature, ReducesCornerErrorsOfRenderedBoardByQuarter
         }
         of_tags[pass] += sum.squaredNorm();
       }
-      correct_corners_for_edge_curvature(all, lens);
+      correct_curvature(all, lens);
     }
     for (const auto& corner : all) stated += 2 * corner.sd_px * corner.sd_px;
     corners += all.size();
@@ -172,12 +171,12 @@ Lens straight_lens() { return Lens(LensModel::pinhole, std::array{500.0, 520.0, 
 
 // The edges of a lens without distortion are straight. The least-squares line of q (w^2 - 1) up to
 // w = r is q (r^2 / 3 - 1), that of c (w^3 - w) is c (3 r^2 / 5 - 1) w.
-TEST(CorrectCornersForEdgeCurvature, MovesCornersByLineFittedToCurvature) {
+TEST(CorrectCurvature, MovesCornersByLineFittedToCurvature) {
   constexpr double q = 0.3, c = 0.2, reach = 0.7;
   auto corners = rectangle_with_curvature({q, c, reach});
   const auto before = corners;
   const double mean = q * (reach * reach / 3 - 1), slope = c * (3 * reach * reach / 5 - 1);
-  const double displacement_px = correct_corners_for_edge_curvature(corners, straight_lens());
+  const double displacement_px = correct_curvature(corners, straight_lens());
   // Outward displacements of the lower, right, upper and left edge at their first and second ends.
   const double first = mean - slope, second = mean + slope;
   const std::array<Eigen::Vector2d, 4> expected{

@@ -30,7 +30,7 @@ class TagsWithDisplacedEdges : public testing::TestWithParam<double> {
     std::vector<BoardView> seen;
     while (static_cast<int>(seen.size()) < count) {
       BoardDetection view = views.random_view(random, noise_px);
-      if (!lattice.are_corners_sufficient_for_pose(view)) continue;
+      if (!lattice.can_determine_pose(view)) continue;
       for (TagDetection& tag : view.tags) tag = shrunk(tag, shift_px);
       seen.push_back({"", views.imager_px, view});
     }
@@ -39,22 +39,21 @@ class TagsWithDisplacedEdges : public testing::TestWithParam<double> {
   IntrinsicsInput make_input(const std::vector<BoardView>& seen) const {
     IntrinsicsInput input{BoardLattice(board()), {}, {800, 600}, LensModel::opencv8};
     for (const BoardView& view : seen)
-      input.views.push_back(input.lattice.list_corners_with_board_positions(view.detection));
+      input.views.push_back(input.lattice.list_corners(view.detection));
     return input;
   }
 };
 
 TEST_P(TagsWithDisplacedEdges, YieldTrueEdgeDisplacementOfEachView) {
   const auto input = make_input(shrunk_views(6, 0, 0.3));
-  const auto shifts = estimate_tag_edge_displacements(input.views, synthetic_lens());
+  const auto shifts = fit_displacements(input.views, synthetic_lens());
   ASSERT_EQ(shifts.size(), 6U);
   for (const EdgeDisplacement& shift : shifts)
-    EXPECT_NEAR(shift.inward_displacement_at_pixel_px(shift.middle), 0.3, 0.005);
-  const auto none =
-      estimate_tag_edge_displacements(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens());
+    EXPECT_NEAR(shift.inward_shift_px(shift.middle), 0.3, 0.005);
+  const auto none = fit_displacements(make_input(shrunk_views(6, 0, 0)).views, synthetic_lens());
   ASSERT_EQ(none.size(), 6U);
   for (const EdgeDisplacement& shift : none)
-    EXPECT_NEAR(shift.inward_displacement_at_pixel_px(shift.middle), 0, 1e-6);
+    EXPECT_NEAR(shift.inward_shift_px(shift.middle), 0, 1e-6);
 }
 
 TEST_P(TagsWithDisplacedEdges, SolveIntrinsicsRecoversEdgeShiftAndTrueLens) {
@@ -65,7 +64,7 @@ TEST_P(TagsWithDisplacedEdges, SolveIntrinsicsRecoversEdgeShiftAndTrueLens) {
   for (const double shift_px : solution.edge_displacements_px) EXPECT_NEAR(shift_px, 0.35, 0.03);
   EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
   const auto difference =
-      compute_projection_difference(synthetic_lens(), solution.fitted_lens(), {800, 600}, even);
+      compare_projections(synthetic_lens(), solution.fitted_lens(), {800, 600}, even);
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->mean_px, 0.03);
 }
@@ -82,7 +81,7 @@ TEST_P(TagsWithDisplacedEdges, SolveIntrinsicsEstimatesNoWarpWhenEdgeShiftVaries
   EXPECT_FALSE(solution.solved_parameters.warp);
   EXPECT_NEAR(solution.rms_px, 0.03, 0.004);
   const auto difference =
-      compute_projection_difference(synthetic_lens(), solution.fitted_lens(), {800, 600}, even);
+      compare_projections(synthetic_lens(), solution.fitted_lens(), {800, 600}, even);
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->mean_px, 0.03);
 }
@@ -110,21 +109,21 @@ TEST(SolveIntrinsicsOfWarpedBoard, EstimatesWarpInsteadOfEdgeShifts) {
   EXPECT_TRUE(solution.solved_parameters.warp);
   EXPECT_NEAR(solution.rms_px, 0.0165, 0.0005);  // 0.0176 with such shifts left in
   const auto difference =
-      compute_projection_difference(wide_lens(), solution.fitted_lens(), kWideImager, even);
+      compare_projections(wide_lens(), solution.fitted_lens(), kWideImager, even);
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->rms_px, 0.006);  // 0.0144
 }
 
-TEST(EstimateTagEdgeDisplacements, ReturnsZeroForTagsWithCornerSquares) {
+TEST(FitDisplacements, ReturnsZeroForTagsWithCornerSquares) {
   const SyntheticViews views{synthetic_board(true), synthetic_lens()};
   Random random(3);
   const auto input = views.input(4, random, 0.1);
-  const auto shifts = estimate_tag_edge_displacements(input.views, views.lens);
+  const auto shifts = fit_displacements(input.views, views.lens);
   ASSERT_EQ(shifts.size(), 4U);
   for (const EdgeDisplacement& shift : shifts) EXPECT_TRUE(shift.coefficients.isZero(0));
 }
 
-TEST(CorrectCornersForEdgeDisplacement, MovesCornersOutwardsAndReturnsMean) {
+TEST(CorrectDisplacement, MovesCornersOutwardsAndReturnsMean) {
   EdgeDisplacement shift;
   shift.coefficients = {0.3, 0.1, -0.2, 0.05};
   shift.middle = {100, 200};
@@ -134,11 +133,11 @@ TEST(CorrectCornersForEdgeDisplacement, MovesCornersOutwardsAndReturnsMean) {
   corners[0].d_pixel_d_edge_shift = {1, -1};
   corners[1].pixel = {100, 300};  // x = 0, y = 2: 0.3 - 0.4 + 0.2
   corners[1].d_pixel_d_edge_shift = {-2, 0.5};
-  EXPECT_NEAR(correct_corners_for_edge_displacement(corners, shift), (0.45 + 0.1) / 2, 1e-12);
+  EXPECT_NEAR(correct_displacement(corners, shift), (0.45 + 0.1) / 2, 1e-12);
   EXPECT_LT((corners[0].pixel - Eigen::Vector2d(149.55, 200.45)).norm(), 1e-12);
   EXPECT_LT((corners[1].pixel - Eigen::Vector2d(100.2, 299.95)).norm(), 1e-12);
   corners.clear();
-  EXPECT_EQ(correct_corners_for_edge_displacement(corners, shift), 0);
+  EXPECT_EQ(correct_displacement(corners, shift), 0);
 }
 
 }  // namespace

@@ -35,18 +35,17 @@ Scatter scatter(double bent_m) {
     EXPECT_TRUE(solution.has_succeeded());
     const Lens lens = solution.fitted_lens();
     const ProjectionDifference difference =
-        compute_projection_difference(views.lens, lens, views.imager_px, [](const auto&) {
+        compare_projections(views.lens, lens, views.imager_px, [](const auto&) {
           return 1;
         }).value();
-    const auto noise = compute_expected_projection_difference(
-        lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
-    const auto by_views = compute_expected_projection_difference(
-        lens, views.imager_px, estimate_intrinsics_covariance_by_jackknife(solution));
+    const auto noise = predict_difference(lens, views.imager_px,
+                                          ProjectionUncertainty(solution).intrinsics_covariance());
+    const auto by_views = predict_difference(lens, views.imager_px, jackknife_covariance(solution));
     sum.found += difference.rms_px * difference.rms_px / kSeeds;
     sum.by_noise += noise.rms_px * noise.rms_px / kSeeds;
     sum.by_views += by_views.rms_px * by_views.rms_px / kSeeds;
     sum.degrees_of_freedom += noise.degrees_of_freedom;
-    const double worst_px = estimate_expected_max_projection_difference_px(
+    const double worst_px = predict_max_difference_px(
         lens, views.imager_px, ProjectionUncertainty(solution).intrinsics_covariance());
     sum.worst_found += difference.worst_px * difference.worst_px / kSeeds;
     sum.worst_by_noise += worst_px * worst_px / kSeeds;
@@ -56,7 +55,7 @@ Scatter scatter(double bent_m) {
 
 // A mean square of n terms has the relative standard deviation sqrt(2 / n); the limit is three
 // times that.
-TEST(ComputeExpectedProjectionDifference, MatchesActualLensErrorForPixelNoise) {
+TEST(PredictDifference, MatchesActualLensErrorForPixelNoise) {
   const Scatter of = scatter(0);
   const double sd = std::sqrt(2 / of.degrees_of_freedom);
   EXPECT_LT(sd, 0.3);
@@ -69,7 +68,7 @@ TEST(ComputeExpectedProjectionDifference, MatchesActualLensErrorForPixelNoise) {
   EXPECT_LT(of.by_views / of.by_noise, 2.5);
 }
 
-TEST(EstimateIntrinsicsCovarianceByJackknife, CoversErrorsOfBoardWarpThatVariesPerView) {
+TEST(JackknifeCovariance, CoversErrorsOfBoardWarpThatVariesPerView) {
   const Scatter of = scatter(0.0005);
   const double sd = std::sqrt(2 / of.degrees_of_freedom);
   EXPECT_GT(of.found / of.by_noise, 1 + 3 * sd);  // noise alone does not explain it

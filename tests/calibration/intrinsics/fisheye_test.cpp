@@ -18,7 +18,7 @@ TEST_P(SolveWideLens, LensAndBoardWarpMatchTruthForExactCorners) {
   Random random(17);
   const auto input = wide_input(GetParam(), 20, random, 0, {0.0004, -0.0003});
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.has_succeeded()) << describe_intrinsics_status(solution.status);
+  ASSERT_TRUE(solution.has_succeeded()) << describe_status(solution.status);
   EXPECT_EQ(solution.views.size(), 20U);
   // The shift of the edges is estimated on a flat board.
   EXPECT_LT(solution.rms_px, GetParam() ? 1e-3 : 0.02);
@@ -36,7 +36,7 @@ TEST_P(SolveWideLens, LensMatchesTruthUpTo94DegreesWithNoisyCorners) {
   EXPECT_NEAR(solution.rms_px, 0.05, 0.005);
   EXPECT_LT(up_to(90, solution.fitted_lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.fitted_lens()).worst_px, 0.1);
-  const CalibrationReport report = compute_lens_calibration_report(solution, input);
+  const CalibrationReport report = make_lens_report(solution, input);
   EXPECT_LT(report.uncertainty_worst_px, 0.4);  // at the rim, beyond 94 degrees
   ASSERT_TRUE(report.split_half_difference);
   EXPECT_LT(report.split_half_difference->rms_px, 0.1);
@@ -81,8 +81,7 @@ TEST(ProjectionUncertainty, FocalSdByTagsMatchesScatterForCorrelatedTagErrors) {
       for (auto& corner : view) {
         const double u = random.normal(), v = random.normal();
         corner.pixel +=
-            errors_px
-                .try_emplace(input.lattice.find_tag_index_of_point(corner.point), 0.1 * u, 0.1 * v)
+            errors_px.try_emplace(input.lattice.get_tag_of_point(corner.point), 0.1 * u, 0.1 * v)
                 .first->second;
       }
     }

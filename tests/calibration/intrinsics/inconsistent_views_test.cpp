@@ -34,7 +34,7 @@ std::vector<std::string> image_names() {
   return names;
 }
 
-TEST(FindViewsInconsistentWithLens, ReturnsViewsOfOtherCamera) {
+TEST(TestViewConsistency, ReturnsViewsOfOtherCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   const SyntheticViews others{synthetic_board(false), other_lens()};
   Random random(3);
@@ -45,30 +45,29 @@ TEST(FindViewsInconsistentWithLens, ReturnsViewsOfOtherCamera) {
     for (const std::size_t view : foreign) input.views[view] = other.views[view];
     const IntrinsicsSolution solution = solve_intrinsics(input);
     ASSERT_TRUE(solution.has_succeeded());
-    const InconsistentViews found = find_views_inconsistent_with_lens(solution);
+    const InconsistentViews found = test_view_consistency(solution);
     EXPECT_THAT(found.views, ElementsAreArray(foreign));
     EXPECT_EQ(found.num_other_views, kViews - foreign.size());
     EXPECT_GT(found.worst_px, 3 * found.typical_px);
-    EXPECT_THAT(describe_inconsistent_views(found, image_names()),
+    EXPECT_THAT(describe_bad_views(found, image_names()),
                 HasSubstr(std::to_string(foreign.size()) + " board images do not fit the other " +
                           std::to_string(kViews - foreign.size()) + ": 10"));
   }
 }
 
-TEST(FindViewsInconsistentWithLens, ReturnsNoneForOneCamera) {
+TEST(TestViewConsistency, ReturnsNoneForOneCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(4);
   for (int set = 0; set < 10; ++set) {
     for (const double noise_px : {0.02, 0.3}) {
       const auto solution = solve_intrinsics(views.input(12 + 2 * set, random, noise_px));
       ASSERT_TRUE(solution.has_succeeded()) << set;
-      EXPECT_THAT(find_views_inconsistent_with_lens(solution).views, IsEmpty())
-          << set << ' ' << noise_px;
+      EXPECT_THAT(test_view_consistency(solution).views, IsEmpty()) << set << ' ' << noise_px;
     }
   }
 }
 
-TEST(FindViewsInconsistentWithLens, ReturnsViewsDroppedBySolveOnlyIfSeveral) {
+TEST(TestViewConsistency, ReturnsViewsDroppedBySolveOnlyIfSeveral) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(5);
   IntrinsicsInput input = views.input(12, random, 0.05);
@@ -76,13 +75,13 @@ TEST(FindViewsInconsistentWithLens, ReturnsViewsDroppedBySolveOnlyIfSeveral) {
   const IntrinsicsSolution one = solve_intrinsics(input);
   ASSERT_TRUE(one.has_succeeded());
   ASSERT_EQ(one.dropped_views.size(), 1U);
-  EXPECT_THAT(find_views_inconsistent_with_lens(one).views, testing::IsEmpty());
+  EXPECT_THAT(test_view_consistency(one).views, testing::IsEmpty());
   for (auto& corner : input.views[7]) corner.pixel.x() += 60 * std::sin(corner.pixel.y() / 15);
   const IntrinsicsSolution two = solve_intrinsics(input);
   ASSERT_TRUE(two.has_succeeded());
-  const InconsistentViews found = find_views_inconsistent_with_lens(two);
+  const InconsistentViews found = test_view_consistency(two);
   ASSERT_THAT(found.views, testing::ElementsAre(4, 7));
-  EXPECT_EQ(describe_inconsistent_views(found, image_names()),
+  EXPECT_EQ(describe_bad_views(found, image_names()),
             "2 board images do not fit the other 10: 104.png, 107.png; were they taken by another "
             "camera?");
 }

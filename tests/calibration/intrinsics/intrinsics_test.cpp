@@ -21,8 +21,7 @@ namespace vlp {
 namespace {
 
 ProjectionDifference difference(const IntrinsicsSolution& solution, const SyntheticViews& views) {
-  return compute_projection_difference(views.lens, solution.fitted_lens(), views.imager_px, even)
-      .value();
+  return compare_projections(views.lens, solution.fitted_lens(), views.imager_px, even).value();
 }
 
 class SolveIntrinsics : public testing::TestWithParam<bool> {
@@ -36,7 +35,7 @@ TEST_P(SolveIntrinsics, LensAndBoardWarpMatchTruthForExactCorners) {
   views_.warp_m = {0.0004, -0.0003};
   const IntrinsicsInput input = views_.input(20, random_, 0);
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.has_succeeded()) << describe_intrinsics_status(solution.status);
+  ASSERT_TRUE(solution.has_succeeded()) << describe_status(solution.status);
   EXPECT_EQ(solution.views.size(), 20U);
   EXPECT_LT(solution.rms_px, 0.001);
   EXPECT_LT(difference(solution, views_).mean_px, 0.002);
@@ -51,8 +50,7 @@ TEST_P(SolveIntrinsics, RecoversFocalLengthsFrom250To4000Pixels) {
     const std::array parameters{focal_px, focal_px, 390.0, 310.0};
     SyntheticViews views{synthetic_board(GetParam()), Lens(LensModel::pinhole, parameters)};
     const IntrinsicsSolution solution = solve_intrinsics(views.input(15, random_, 0.05));
-    ASSERT_TRUE(solution.has_succeeded())
-        << focal_px << describe_intrinsics_status(solution.status);
+    ASSERT_TRUE(solution.has_succeeded()) << focal_px << describe_status(solution.status);
     EXPECT_NEAR(solution.problem.intrinsics[0] / focal_px, 1, 0.01) << focal_px;
     EXPECT_NEAR(solution.rms_px, 0.05, 0.01) << focal_px;
   }
@@ -136,13 +134,12 @@ IntrinsicsInput make_exact_views(int count, const Lens& lens = fisheye_for_solve
 }
 
 TEST(DescribeIntrinsicsStatus, StatesCause) {
-  EXPECT_EQ(describe_intrinsics_status(IntrinsicsStatus::ok), "ok");
-  EXPECT_TRUE(describe_intrinsics_status(IntrinsicsStatus::too_few_views)
-                  .starts_with("fewer than three views"));
-  EXPECT_TRUE(describe_intrinsics_status(IntrinsicsStatus::all_parallel)
+  EXPECT_EQ(describe_status(IntrinsicsStatus::ok), "ok");
+  EXPECT_TRUE(
+      describe_status(IntrinsicsStatus::too_few_views).starts_with("fewer than three views"));
+  EXPECT_TRUE(describe_status(IntrinsicsStatus::all_parallel)
                   .starts_with("all views show the board at the same angle"));
-  EXPECT_TRUE(describe_intrinsics_status(IntrinsicsStatus::no_solution)
-                  .starts_with("no lens fits the views"));
+  EXPECT_TRUE(describe_status(IntrinsicsStatus::no_solution).starts_with("no lens fits the views"));
 }
 
 /// Views with more than half of the worst residual are dropped first.
@@ -209,7 +206,7 @@ IntrinsicsInput make_tilted_views(double tilt_rad) {
         Eigen::AngleAxisd(tilt, Eigen::Vector3d(0.6, 0.8, 0)).toRotationMatrix();
     const BoardDetection seen =
         views.view(rotation, {0.03 * (i - 3), 0.02 * (i % 3 - 1), 0.2 + 0.01 * i}, random, 0);
-    input.views.push_back(input.lattice.list_corners_with_board_positions(seen));
+    input.views.push_back(input.lattice.list_corners(seen));
     for (auto& corner : input.views.back()) corner.d_pixel_d_edge_shift.setZero();
   }
   return input;
@@ -231,14 +228,14 @@ TEST(SolveIntrinsics, EstimatesWarpOfExactBoard) {
   EXPECT_LT(solution.rms_px, 1e-5);
 }
 
-TEST(SolveIntrinsicsFromHalfOfViews, FailsForParallelBoardsAndUnseenPoints) {
+TEST(SolveHalfOfViews, FailsForParallelBoardsAndUnseenPoints) {
   const IntrinsicsSolution whole = solve_intrinsics(make_tilted_views(0.3));
   ASSERT_TRUE(whole.has_succeeded());
   ASSERT_EQ(whole.views.size(), 6U);
-  EXPECT_EQ(solve_intrinsics_from_half_of_views(whole, 0).status, IntrinsicsStatus::all_parallel);
+  EXPECT_EQ(solve_half_of_views(whole, 0).status, IntrinsicsStatus::all_parallel);
   IntrinsicsSolution unseen = whole;
   for (Eigen::Vector3d& point : unseen.problem.points) point.z() = BoardProblem::kUnseen;
-  EXPECT_EQ(solve_intrinsics_from_half_of_views(unseen, 0).status, IntrinsicsStatus::no_solution);
+  EXPECT_EQ(solve_half_of_views(unseen, 0).status, IntrinsicsStatus::no_solution);
 }
 
 /// Corners with the same standard deviation have the same weight.
@@ -292,7 +289,7 @@ TEST(SolveIntrinsics, KeepsWeightsIfNoSdIsKnown) {
 }
 
 /// Splined model that is fast to solve, and a lens up to 58 degrees off the axis.
-constexpr LensModel kSmallSpline = lens_model_for_spline_grid({3, 9, 8, 130});
+constexpr LensModel kSmallSpline = splined_lens_model({3, 9, 8, 130});
 Lens lens_of_small_spline() {
   return {LensModel::fisheye, std::array{420.0, 422.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006}};
 }
@@ -331,9 +328,8 @@ TEST(SolveIntrinsics, SplinedLensKeepsAxisAndSidewaysRaysOfFisheye) {
   symmetric.lens_model = LensModel::fisheye;
   symmetric.intrinsics = {420, 422, 402, 297, 0.03, -0.012, 0.004, -0.0006};
   ASSERT_TRUE(solve_board_problem(symmetric, {.core = true, .distortions = true}));
-  const auto rotation =
-      fit_rotation_between_lenses(lens, Lens(symmetric.lens_model, symmetric.intrinsics),
-                                  collect_inlier_corner_pixels(solution.problem));
+  const auto rotation = fit_lens_rotation(lens, Lens(symmetric.lens_model, symmetric.intrinsics),
+                                          list_inlier_pixels(solution.problem));
   ASSERT_TRUE(rotation);
   EXPECT_LT(Eigen::AngleAxisd(*rotation).angle(), 1.2e-4);
 }
@@ -345,7 +341,7 @@ std::vector<std::pair<std::size_t, std::size_t>> list_outlier_tags(
   for (std::size_t i = 0; i < solution.problem.points.size(); ++i) {
     const double weight = solution.problem.points[i].z();
     if (weight >= 0 || weight == BoardProblem::kUnseen) continue;
-    tags.emplace_back(i / 120, lattice.find_tag_index_of_point(i % 120));
+    tags.emplace_back(i / 120, lattice.get_tag_of_point(i % 120));
   }
   return tags;
 }
@@ -355,7 +351,7 @@ TEST(SolveFirstStages, MarksTagsWithDisplacedCornerForSplinedLens) {
   for (const double size_px : {0.08, 0.14}) {
     IntrinsicsInput input = make_exact_views(10, lens_of_small_spline());
     const std::size_t view = 4, corner = 9;
-    const std::size_t tag = input.lattice.find_tag_index_of_point(input.views[view][corner].point);
+    const std::size_t tag = input.lattice.get_tag_of_point(input.views[view][corner].point);
     input.views[view][corner].pixel.y() += size_px;
     const auto solution = InitialSolutions(input).solve_first_stages(kSmallSpline);
     ASSERT_TRUE(solution);

@@ -53,12 +53,12 @@ void expect_chosen(const Lens& lens) {
   const auto choice = select_lens_model(InitialSolutions(seen_through(lens, count)));
   ASSERT_TRUE(choice);
   EXPECT_EQ(lens_model_name(choice->model), lens_model_name(lens.lens_model()))
-      << describe_lens_model_choice(*choice);
+      << describe_choice(*choice);
   // Noise, and errors outside the region of the other views.
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.25 * kNoise_px);
   EXPECT_EQ(choice->candidates.size(), 5U);
-  EXPECT_TRUE(describe_lens_model_choice(*choice).starts_with(lens_model_name(lens.lens_model())))
-      << describe_lens_model_choice(*choice);
+  EXPECT_TRUE(describe_choice(*choice).starts_with(lens_model_name(lens.lens_model())))
+      << describe_choice(*choice);
 }
 
 TEST(SelectLensModel, ReturnsOpencv4ForRadialLens) { expect_chosen(radial_lens()); }
@@ -76,7 +76,7 @@ TEST(SelectLensModel, ReturnsRationalModelDespiteOneBadView) {
   const auto choice = select_lens_model(InitialSolutions(input));
   ASSERT_TRUE(choice);
   EXPECT_TRUE(choice->model == LensModel::opencv8 || choice->model == LensModel::opencv12)
-      << describe_lens_model_choice(*choice);
+      << describe_choice(*choice);
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.4 * kNoise_px);
 }
 
@@ -90,8 +90,8 @@ TEST(SelectLensModel, RejectsOpencv4ForRationalLensEvenIfFewViewsLieFarFromCente
   const Eigen::Vector2d middle = rational_lens().principal_point_px();
   while (input.views.size() < all) {
     const BoardDetection seen = views.random_view(random, kNoise_px);
-    if (!input.lattice.are_corners_sufficient_for_pose(seen)) continue;
-    auto corners = input.lattice.list_corners_with_board_positions(seen);
+    if (!input.lattice.can_determine_pose(seen)) continue;
+    auto corners = input.lattice.list_corners(seen);
     const bool inner = std::all_of(corners.begin(), corners.end(), [&](const auto& corner) {
       return (corner.pixel - middle).norm() < inner_px;
     });
@@ -101,7 +101,7 @@ TEST(SelectLensModel, RejectsOpencv4ForRationalLensEvenIfFewViewsLieFarFromCente
   const auto choice = select_lens_model(InitialSolutions(input));
   ASSERT_TRUE(choice);
   EXPECT_NE(lens_model_name(choice->model), lens_model_name(LensModel::opencv4))
-      << describe_lens_model_choice(*choice);
+      << describe_choice(*choice);
   EXPECT_LT(find_rms(*choice, choice->model), 2 * kNoise_px);
 }
 
@@ -138,28 +138,27 @@ TEST(SolveIntrinsics, GivesSameLensFromInitialSolutionsOfOtherModel) {
             alone.problem.intrinsics);
 }
 
-TEST(IsFisheyeModelClearlyWorse, ReturnsTrueOnlyForLensThatFisheyeCannotFit) {
+TEST(IsFisheyeWorse, ReturnsTrueOnlyForLensThatFisheyeCannotFit) {
   constexpr double low_noise_px = 0.002;  // the models differ by less than kNoise_px
   const auto is_worse = [&](const Lens& lens, LensModel other) {
     const SyntheticViews views{synthetic_board(false), lens};
     Random random(41);
-    return is_fisheye_model_clearly_worse(InitialSolutions(views.input(12, random, low_noise_px)),
-                                          other);
+    return is_fisheye_worse(InitialSolutions(views.input(12, random, low_noise_px)), other);
   };
   EXPECT_TRUE(is_worse(rational_lens(), LensModel::opencv8));
   EXPECT_FALSE(is_worse(fisheye_lens(), LensModel::opencv4));
 }
 
-TEST(IsFisheyeModelClearlyWorse, ReturnsFalseBeyondRightAngle) {
+TEST(IsFisheyeWorse, ReturnsFalseBeyondRightAngle) {
   Random random(44);
   const InitialSolutions initial(wide_input(false, 24, random, kNoise_px));
-  EXPECT_FALSE(is_fisheye_model_clearly_worse(initial, LensModel::opencv8));
+  EXPECT_FALSE(is_fisheye_worse(initial, LensModel::opencv8));
 }
 
-TEST(DescribeLensModelChoice, StatesOffAxisAngleWhenBoardIsBeyondRightAngle) {
+TEST(DescribeChoice, StatesOffAxisAngleWhenBoardIsBeyondRightAngle) {
   const LensChoice choice{
       LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512, 0, 0}}, 1.7};
-  EXPECT_EQ(describe_lens_model_choice(choice),
+  EXPECT_EQ(describe_choice(choice),
             "OPENCV_FISHEYE 0.0512 px (0.0 % above the best, limit 0.0 %) in held-out views; the "
             "board is visible up to 97 degrees off axis, where no LENSMODEL_OPENCVn has rays");
 }

@@ -63,8 +63,8 @@ TEST(EstimateLens, ReturnsLensWithUncertaintyAndWithoutWarnings) {
   EXPECT_EQ(result.held_out.views, 0);
   EXPECT_FALSE(result.choice || result.better_model || result.print_px || result.sharpness);
   ASSERT_TRUE(result.lattice);
-  const auto difference = compute_projection_difference(
-      synthetic_lens(), result.solution.fitted_lens(), {800, 600}, [](const auto&) { return 1.0; });
+  const auto difference = compare_projections(synthetic_lens(), result.solution.fitted_lens(),
+                                              {800, 600}, [](const auto&) { return 1.0; });
   ASSERT_TRUE(difference);
   EXPECT_LT(difference->rms_px, 3 * result.report.expected_rms_px);
   ASSERT_TRUE(result.intrinsics_covariance);
@@ -162,8 +162,8 @@ TEST(EstimateLens, AddsErrorOfPrintToUncertainty) {
   EXPECT_GT(result.report.uncertainty_mean_px, exact.report.uncertainty_mean_px);
   EXPECT_GT(result.report.uncertainty_worst_px, exact.report.uncertainty_worst_px);
   ASSERT_TRUE(exact.intrinsics_covariance && result.intrinsics_covariance);
-  const auto effect = compute_board_aspect_error_effect_on_lens(
-      exact.solution, input.board.print_sd, exact.report.region);
+  const auto effect =
+      estimate_aspect_effect(exact.solution, input.board.print_sd, exact.report.region);
   ASSERT_TRUE(effect);
   const Eigen::MatrixXd added = effect->intrinsics * effect->intrinsics.transpose();
   EXPECT_THAT((*result.intrinsics_covariance - *exact.intrinsics_covariance).eval(),
@@ -216,19 +216,19 @@ TEST(EstimateLens, ChoosesFisheyeForBoardsBeyondRightAngle) {
   EXPECT_THAT(result.warnings, IsEmpty());
 }
 
-TEST(SelectBoardWarpModel, TurnsWarpOffForSquareChessboardOnly) {
+TEST(SelectBoardWarp, TurnsWarpOffForSquareChessboardOnly) {
   Board chessboard;
   chessboard.kind = BoardKind::chessboard;
   chessboard.cols = chessboard.rows = 7;
-  EXPECT_EQ(select_board_warp_model(chessboard, WarpChoice::automatic), WarpChoice::off);
-  EXPECT_EQ(select_board_warp_model(chessboard, WarpChoice::off), WarpChoice::off);
-  EXPECT_THROW(select_board_warp_model(chessboard, WarpChoice::on), std::invalid_argument);
+  EXPECT_EQ(select_board_warp(chessboard, WarpChoice::automatic), WarpChoice::off);
+  EXPECT_EQ(select_board_warp(chessboard, WarpChoice::off), WarpChoice::off);
+  EXPECT_THROW(select_board_warp(chessboard, WarpChoice::on), std::invalid_argument);
   chessboard.rows = 6;
   Board tags = synthetic_board(false);
   tags.rows = tags.cols;
   for (const Board& board : {chessboard, tags}) {
     for (const WarpChoice warp : {WarpChoice::automatic, WarpChoice::on, WarpChoice::off}) {
-      EXPECT_EQ(select_board_warp_model(board, warp), warp);
+      EXPECT_EQ(select_board_warp(board, warp), warp);
     }
   }
 }
@@ -238,7 +238,7 @@ IntrinsicsInput make_solver_input(const LensEstimate& result, const Board& board
   IntrinsicsInput input{
       BoardLattice(board), {}, result.views.front().imager_px, result.solution.problem.lens_model};
   for (const BoardView& view : result.views)
-    input.views.push_back(input.lattice.list_corners_with_board_positions(view.detection));
+    input.views.push_back(input.lattice.list_corners(view.detection));
   return input;
 }
 
@@ -257,7 +257,7 @@ TEST(EstimateLens, CovarianceIsThatByTagsPlusBiasOfRegularization) {
   ASSERT_TRUE(result.has_succeeded()) << result.problem;
   ASSERT_TRUE(result.intrinsics_covariance && result.lattice);
   const ProjectionUncertainty uncertainty(result.solution, *result.lattice);
-  const Eigen::VectorXd& bias = uncertainty.intrinsics_regularization_bias();
+  const Eigen::VectorXd& bias = uncertainty.regularization_bias();
   ASSERT_GT(bias.norm(), 0);
   Eigen::MatrixXd expected = uncertainty.intrinsics_covariance() + bias * bias.transpose();
   if (const auto& model = result.model_uncertainty) expected += model->intrinsics_covariance;
@@ -267,7 +267,7 @@ TEST(EstimateLens, CovarianceIsThatByTagsPlusBiasOfRegularization) {
           .eval(),
       IsNear(Eigen::MatrixXd::Zero(12, 12).eval(), 1e-9));
   const IntrinsicsInput solver_input = make_solver_input(result, input.board);
-  const ViewCoverage coverage = compute_board_view_coverage(result.solution, solver_input);
+  const ViewCoverage coverage = measure_view_coverage(result.solution, solver_input);
   EXPECT_EQ(result.coverage.corners, coverage.corners);
   EXPECT_EQ(result.coverage.covered_fraction, coverage.covered_fraction);
   EXPECT_EQ(result.coverage.tilts_rad, coverage.tilts_rad);
@@ -337,13 +337,12 @@ TEST(EstimateLens, RecommendsFisheyeThatFitsClearlyBetterAndAddsModelUncertainty
                   deg_from_rad(fisheye->max_corner_angle_rad), fisheye->solution.rms_px,
                   result.solution.rms_px)));
   // Another model folds nearer to the center.
-  const CalibrationReport report = compute_lens_calibration_report(
+  const CalibrationReport report = make_lens_report(
       result.solution, solver_input,
-      ProjectionUncertainty::compute_uncertainty_by_corners_and_by_tags(result.solution,
-                                                                        solver_input.lattice),
+      ProjectionUncertainty::compare_corners_and_tags(result.solution, solver_input.lattice),
       result.report.region);
   EXPECT_LT(report.region_fraction,
-            compute_lens_calibration_report(result.solution, solver_input).region_fraction);
+            make_lens_report(result.solution, solver_input).region_fraction);
   ASSERT_TRUE(result.model_uncertainty);
   const ModelUncertainty& model = *result.model_uncertainty;
   EXPECT_EQ(model.model, LensModel::fisheye);
@@ -374,7 +373,7 @@ BoardView make_far_view() {
 
 /// A board beyond the control points has no pose.
 TEST(EstimateLens, WarnsOfViewBeyondControlPointsOfSplinedLens) {
-  LensViews input = make_wide_views(10, 55, lens_model_for_spline_grid({3, 10, 10, 130}));
+  LensViews input = make_wide_views(10, 55, splined_lens_model({3, 10, 10, 130}));
   input.views.push_back(make_far_view());
   ASSERT_GT(input.views.back().detection.tags.size(), 20U);
   const LensEstimate result = estimate_lens(input);

@@ -48,13 +48,12 @@ std::vector<BoardView> make_views(const StepAt& step_at, int count = 24) {
 }
 
 LensSharpness measured(const StepAt& step_at) {
-  return measure_lens_sharpness(make_views(step_at), kSharpnessImager_px).value();
+  return measure_sharpness(make_views(step_at), kSharpnessImager_px).value();
 }
 
-TEST(MeasureLensSharpness, ReturnsMtf50AndNoDefectsForUniformBlur) {
+TEST(MeasureSharpness, ReturnsMtf50AndNoDefectsForUniformBlur) {
   const LensSharpness even = measured(even_step);
-  EXPECT_NEAR(even.mean_mtf50, compute_mtf50_of_gaussian_blur(kLensBlur_px),
-              0.02 * even.mean_mtf50);
+  EXPECT_NEAR(even.mean_mtf50, compute_mtf50_of_blur(kLensBlur_px), 0.02 * even.mean_mtf50);
   EXPECT_GT(even.worst_ratio, 0.97);
   EXPECT_LT(even.asymmetry, 0.02);
   EXPECT_LT(even.local_loss, 0.03);
@@ -62,7 +61,7 @@ TEST(MeasureLensSharpness, ReturnsMtf50AndNoDefectsForUniformBlur) {
   EXPECT_NEAR(even.black_level, 14.0 / 190, 1e-6);
 }
 
-TEST(MeasureLensSharpness, ReportsAsymmetryForTiltedFocalPlane) {
+TEST(MeasureSharpness, ReportsAsymmetryForTiltedFocalPlane) {
   const LensSharpness tilted = measured([](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
     step.blur_px = std::hypot(step.blur_px, 1.0 * (at_px.x() / 400 - 1));
@@ -72,7 +71,7 @@ TEST(MeasureLensSharpness, ReportsAsymmetryForTiltedFocalPlane) {
   EXPECT_LT(tilted.worst_ratio, 0.9);
 }
 
-TEST(MeasureLensSharpness, ReturnsDepthAndPositionOfDustShadow) {
+TEST(MeasureSharpness, ReturnsDepthAndPositionOfDustShadow) {
   const Eigen::Vector2d dust_px(500, 200);
   const LensSharpness dusty = measured([&](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
@@ -86,7 +85,7 @@ TEST(MeasureLensSharpness, ReturnsDepthAndPositionOfDustShadow) {
   EXPECT_LT(dusty.local_loss, 0.05);
 }
 
-TEST(MeasureLensSharpness, ReportsLocalMtf50LossWhereLensIsSmeared) {
+TEST(MeasureSharpness, ReportsLocalMtf50LossWhereLensIsSmeared) {
   const Eigen::Vector2d smear_px(300, 350);
   const LensSharpness smeared = measured([&](const Eigen::Vector2d& at_px, int view) {
     EdgeStep step = even_step(at_px, view);
@@ -98,12 +97,12 @@ TEST(MeasureLensSharpness, ReportsLocalMtf50LossWhereLensIsSmeared) {
   EXPECT_LT(smeared.local_shadow, 0.01);
 }
 
-TEST(MeasureLensSharpness, ReturnsNulloptWhenTagsHaveNoEdgeSteps) {
+TEST(MeasureSharpness, ReturnsNulloptWhenTagsHaveNoEdgeSteps) {
   auto views = make_views(even_step, 6);
   for (BoardView& view : views) {
     for (TagDetection& tag : view.detection.tags) tag.steps = {};
   }
-  EXPECT_FALSE(measure_lens_sharpness(views, kSharpnessImager_px));
+  EXPECT_FALSE(measure_sharpness(views, kSharpnessImager_px));
 }
 
 TEST(ComputeMedianEdgeMtf50, ReturnsMtf50OfUpperMedianBlur) {
@@ -115,12 +114,12 @@ TEST(ComputeMedianEdgeMtf50, ReturnsMtf50OfUpperMedianBlur) {
   }
   const auto found = compute_median_edge_mtf50(seen);
   ASSERT_TRUE(found);
-  EXPECT_DOUBLE_EQ(*found, compute_mtf50_of_gaussian_blur(1.1));
+  EXPECT_DOUBLE_EQ(*found, compute_mtf50_of_blur(1.1));
 
   seen.tags[0].steps[0].blur_px = 0;  // not measured
   const auto of_seven = compute_median_edge_mtf50(seen);
   ASSERT_TRUE(of_seven);
-  EXPECT_DOUBLE_EQ(*of_seven, compute_mtf50_of_gaussian_blur(0.9));
+  EXPECT_DOUBLE_EQ(*of_seven, compute_mtf50_of_blur(0.9));
 }
 
 // Tests with exact values: a small tag in the middle of each of `cols` x `rows` equal parts of an
@@ -160,8 +159,7 @@ std::vector<BoardView> make_views_of_parts(const StepInPart& step_in_part, int c
 
 std::optional<LensSharpness> measure_parts(const StepInPart& step_in_part, int count, int cols = 12,
                                            int rows = 9) {
-  return measure_lens_sharpness(make_views_of_parts(step_in_part, count, cols, rows),
-                                kPartsImager_px);
+  return measure_sharpness(make_views_of_parts(step_in_part, count, cols, rows), kPartsImager_px);
 }
 
 /// Smooth positive function without symmetry.
@@ -193,15 +191,15 @@ double compute_expected_local_loss(const LensSharpness::Map& map, int reach) {
   return largest;
 }
 
-TEST(ComputeMtf50OfGaussianBlur, IsFrequencyOfHalfModulation) {
+TEST(ComputeMtf50OfBlur, IsFrequencyOfHalfModulation) {
   for (const double sigma_px : {0.4, 0.8, 2.0}) {
-    const double frequency = compute_mtf50_of_gaussian_blur(sigma_px);
+    const double frequency = compute_mtf50_of_blur(sigma_px);
     EXPECT_GT(frequency, 0);
     EXPECT_NEAR(std::exp(-2 * std::pow(std::numbers::pi * sigma_px * frequency, 2)), 0.5, 1e-12);
   }
 }
 
-TEST(MeasureLensSharpness, EachPartHasLowerQuartileOfViewMedians) {
+TEST(MeasureSharpness, EachPartHasLowerQuartileOfViewMedians) {
   // Upper medians of the four edges: 1.1 times the blur of the view.
   const std::array<double, 4> edges{1.1, 0.9, 1.4, 1.0};
   const std::array<double, 8> views{1.3, 1.0, 1.7, 1.1, 1.4, 1.6, 1.2, 1.5};
@@ -219,18 +217,18 @@ TEST(MeasureLensSharpness, EachPartHasLowerQuartileOfViewMedians) {
     double sum = 0;
     for (int row = 0; row < 9; ++row) {
       for (int col = 0; col < 12; ++col) {
-        const double expected = compute_mtf50_of_gaussian_blur(uneven_value(col, row) * quartile);
+        const double expected = compute_mtf50_of_blur(uneven_value(col, row) * quartile);
         EXPECT_NEAR(found->mtf50.at(col, row), expected, 1e-12) << col << ' ' << row;
         sum += expected;
       }
     }
     EXPECT_NEAR(found->mean_mtf50, sum / 108, 1e-12);
-    const double worst = compute_mtf50_of_gaussian_blur(uneven_value(11, 8) * quartile);
+    const double worst = compute_mtf50_of_blur(uneven_value(11, 8) * quartile);
     EXPECT_NEAR(found->worst_ratio, worst / (sum / 108), 1e-12);
   }
 }
 
-TEST(MeasureLensSharpness, EdgeCountsForPartOfItsMiddle) {
+TEST(MeasureSharpness, EdgeCountsForPartOfItsMiddle) {
   // A tag 220 px wide and 100 px high: the middle of each edge is in a part of its own.
   auto views = make_views_of_parts(
       [](int col, int row, int, std::size_t) {
@@ -242,10 +240,10 @@ TEST(MeasureLensSharpness, EdgeCountsForPartOfItsMiddle) {
     tag.steps = {{{0.5, 20, 200}, {0.6, 20, 200}, {0.7, 20, 200}, {0.9, 20, 200}}};
     view.detection.tags.insert(view.detection.tags.begin(), tag);
   }
-  const auto found = measure_lens_sharpness(views, kPartsImager_px);
+  const auto found = measure_sharpness(views, kPartsImager_px);
   ASSERT_TRUE(found);
   const auto blur_px = [&](int col, int row) {
-    return compute_mtf50_of_gaussian_blur(1) / found->mtf50.at(col, row);
+    return compute_mtf50_of_blur(1) / found->mtf50.at(col, row);
   };
   EXPECT_NEAR(blur_px(2, 1), 0.5, 1e-12) << "lower edge";
   EXPECT_NEAR(blur_px(3, 1), 0.6, 1e-12) << "right edge";
@@ -255,7 +253,7 @@ TEST(MeasureLensSharpness, EdgeCountsForPartOfItsMiddle) {
   EXPECT_TRUE(std::isnan(found->mtf50.at(3, 0)));
 }
 
-TEST(MeasureLensSharpness, AsymmetryIsTwiceTheSumOfDipoleAndQuadrupole) {
+TEST(MeasureSharpness, AsymmetryIsTwiceTheSumOfDipoleAndQuadrupole) {
   const double a = 0.03, b = -0.04, d = 0.005, e = 0.012;
   const auto sharpness_at = [&](int col, int row) {
     const double x = (100 * (col + 0.5) - 600) / 270, y = (60 * (row + 0.5) - 270) / 270;
@@ -279,7 +277,7 @@ TEST(MeasureLensSharpness, AsymmetryIsTwiceTheSumOfDipoleAndQuadrupole) {
   EXPECT_NEAR(found->asymmetry, 2 * (0.05 + 0.013) / (sum / 90), 1e-10);
 }
 
-TEST(MeasureLensSharpness, LocalLossComparesWithMediansOfOppositeParts) {
+TEST(MeasureSharpness, LocalLossComparesWithMediansOfOppositeParts) {
   Random random(5);
   std::vector<double> values(108);
   for (double& value : values) value = random.uniform(0.7, 1.0);
@@ -297,7 +295,7 @@ TEST(MeasureLensSharpness, LocalLossComparesWithMediansOfOppositeParts) {
   EXPECT_GT(found->local_loss, 0.1);
 }
 
-TEST(MeasureLensSharpness, LocalShadowIsLossOfMeanLightInMiddleOfItsPart) {
+TEST(MeasureSharpness, LocalShadowIsLossOfMeanLightInMiddleOfItsPart) {
   // The light decreases smoothly to the right and down, and is reduced to 70 to 90 % in one part.
   const std::array<double, 4> shadow{0.7, 0.9, 0.75, 0.85};
   const auto found = measure_parts(

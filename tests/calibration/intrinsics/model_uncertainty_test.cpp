@@ -37,7 +37,7 @@ IntrinsicsSolution solve_exact_views(LensModel model, double focal_px, double k1
 const ImageRegion kRegion{{100, 100}, {700, 100}, {700, 500}, {100, 500}};
 
 /// Compares OPENCV4, 520 px, with fits of OPENCV5.
-class ComputeModelUncertainty : public testing::Test {
+class CombineModelFits : public testing::Test {
  protected:
   void SetUp() override {
     ASSERT_TRUE(solution.has_succeeded());
@@ -49,11 +49,11 @@ class ComputeModelUncertainty : public testing::Test {
 
   std::optional<ModelUncertainty> compute(const std::vector<IntrinsicsSolution>& others,
                                           double noise_px = 0.001) const {
-    return compute_model_uncertainty(solution, others, kRegion, noise_px);
+    return combine_model_fits(solution, others, kRegion, noise_px);
   }
 };
 
-TEST_F(ComputeModelUncertainty, ReturnsDifferenceToOneModel) {
+TEST_F(CombineModelFits, ReturnsDifferenceToOneModel) {
   const auto found = compute({longer});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->model, LensModel::opencv5);
@@ -73,7 +73,7 @@ TEST_F(ComputeModelUncertainty, ReturnsDifferenceToOneModel) {
 }
 
 /// The covariances of differences in other directions add up if noise explains none of them.
-TEST_F(ComputeModelUncertainty, AddsDifferencesInOtherDirections) {
+TEST_F(CombineModelFits, AddsDifferencesInOtherDirections) {
   const IntrinsicsSolution bent = solve_exact_views(LensModel::opencv5, 520, -0.22);
   const auto first = compute({longer}), second = compute({bent}), both = compute({bent, longer});
   ASSERT_TRUE(first && second && both);
@@ -112,7 +112,7 @@ LensViews make_weak_views(const Lens& lens, std::uint64_t seed) {
     const Eigen::Vector3d middle(u * kImager[0], v * kImager[1], lens.focal_px().x());
     const BoardDetection seen =
         synthetic.view(rotation, middle * (z_m / middle.z()), random, noise_px);
-    if (!lattice.are_corners_sufficient_for_pose(seen)) continue;
+    if (!lattice.can_determine_pose(seen)) continue;
     input.views.push_back({std::to_string(input.views.size()), synthetic.imager_px, seen});
   }
   return input;
@@ -137,8 +137,8 @@ TEST(EstimateLens, StatedErrorCoversErrorOfWrongModelWithWeakViews) {
         ASSERT_TRUE(result.has_succeeded()) << result.problem;
         EXPECT_TRUE(result.are_models_compared);
         const Lens lens = result.solution.fitted_lens();
-        const auto difference = compute_projection_difference(
-            lenses[truth], lens, kImager, [&](const Eigen::Vector2d& pixel) {
+        const auto difference =
+            compare_projections(lenses[truth], lens, kImager, [&](const Eigen::Vector2d& pixel) {
               return polygon_contains(result.report.region, pixel) ? 1.0 : INFINITY;
             });
         ASSERT_TRUE(difference && result.intrinsics_covariance);

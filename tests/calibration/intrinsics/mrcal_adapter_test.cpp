@@ -85,26 +85,26 @@ BoardProblem make_exact_mrcal_problem(LensModel model, int boards = 4, int cols 
 
 constexpr SolveOptions kAllParameters{.core = true, .distortions = true, .warp = true};
 
-TEST(SolveBoardProblemByMrcal, ErrorByRegularizationDecreasesWithSquareOfNoise) {
+TEST(SolveByMrcal, ErrorByRegularizationDecreasesWithSquareOfNoise) {
   std::vector<double> errors;
   for (const double noise_px : {1.0, 0.2}) {
     const BoardProblem truth = make_exact_mrcal_problem(LensModel::opencv4);
     BoardProblem problem = truth;
     problem.noise_px = noise_px;
-    ASSERT_TRUE(solve_board_problem_by_mrcal(problem, kAllParameters));
+    ASSERT_TRUE(solve_by_mrcal(problem, kAllParameters));
     errors.push_back(problem.intrinsics[5] - truth.intrinsics[5]);
   }
   ASSERT_GT(std::abs(errors[0]), 1e-5);
   EXPECT_NEAR(errors[1] / errors[0], 0.04, 0.02);
 }
 
-TEST(SolveBoardProblemByMrcal, ThrowsForModelThatMrcalLacks) {
+TEST(SolveByMrcal, ThrowsForModelThatMrcalLacks) {
   BoardProblem problem = make_exact_mrcal_problem(LensModel::pinhole);
   problem.lens_model = LensModel::fisheye;
   problem.intrinsics.resize(8, 0);
   std::string message;
   try {
-    solve_board_problem_by_mrcal(problem, kAllParameters);
+    solve_by_mrcal(problem, kAllParameters);
   } catch (const std::runtime_error& error) {
     message = error.what();
   }

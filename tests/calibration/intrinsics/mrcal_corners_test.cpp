@@ -22,7 +22,7 @@ IntrinsicsInput make_input(const Board& board, const std::vector<BoardView>& vie
                            LensModel model) {
   IntrinsicsInput input{BoardLattice(board), {}, kImager_px, model};
   for (const BoardView& view : views)
-    input.views.push_back(input.lattice.list_corners_with_board_positions(view.detection));
+    input.views.push_back(input.lattice.list_corners(view.detection));
   return input;
 }
 
@@ -53,11 +53,10 @@ TEST_P(WriteMrcalCorners, RereadCornersYieldSameLensAsOriginalSolve) {
   const IntrinsicsSolution again =
       solve_intrinsics(make_input(views.board, read, LensModel::opencv8));
   ASSERT_TRUE(again.has_succeeded());
-  EXPECT_LT(
-      compute_projection_difference(solution.fitted_lens(), again.fitted_lens(), kImager_px, even)
-          .value()
-          .worst_px,
-      1e-3);
+  EXPECT_LT(compare_projections(solution.fitted_lens(), again.fitted_lens(), kImager_px, even)
+                .value()
+                .worst_px,
+            1e-3);
   EXPECT_NEAR(again.rms_px, solution.rms_px, 1e-5);
 }
 
@@ -74,7 +73,7 @@ TEST_P(WriteMrcalCorners, AppendsNumbersToRepeatedImageNames) {
   std::vector<std::string> found;
   for (const BoardView& view :
        read_mrcal_corners(folder / "corners.vnl", views.board, kImager_px)) {
-    EXPECT_TRUE(view.detection.has_detected_corners());
+    EXPECT_TRUE(view.detection.has_corners());
     found.push_back(view.image);
   }
   EXPECT_EQ(found, (std::vector<std::string>{"0.png", "1.png", "0.png-2", "1.png-2", "1.png-2-2",
@@ -110,7 +109,7 @@ TEST(ReadMrcalCorners, ReturnsWeightsFromLevelOrWeightColumn) {
   };
   const auto by_level = read("# filename x y level\n");
   ASSERT_EQ(by_level.size(), 2U);
-  EXPECT_FALSE(by_level[1].detection.has_detected_corners());
+  EXPECT_FALSE(by_level[1].detection.has_corners());
   ASSERT_EQ(by_level[0].detection.points.size(), 11U);
   EXPECT_EQ(by_level[0].detection.points[0].index, 1U);
   EXPECT_EQ(by_level[0].detection.points[0].weight, 1);  // mrcal takes the whole part

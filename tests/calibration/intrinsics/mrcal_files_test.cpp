@@ -35,7 +35,7 @@ IntrinsicsSolution make_small_solution(LensModel model, std::vector<double> intr
 /// Returns the entries of the inputs of the solve as Python reads them: name, type, value.
 std::string read_optimization_inputs(const IntrinsicsSolution& solution) {
   const TemporaryFolder folder;
-  write_mrcal_cameramodel(folder / "a.cameramodel", solution, {});
+  write_cameramodel(folder / "a.cameramodel", solution, {});
   const auto script =
       folder.file("read.py",
                   "import ast, base64, io, sys, numpy\n"
@@ -49,10 +49,10 @@ std::string read_optimization_inputs(const IntrinsicsSolution& solution) {
   return text;
 }
 
-TEST(WriteMrcalCameramodel, WritesLensWith17DigitsAndImageSize) {
+TEST(WriteCameramodel, WritesLensWith17DigitsAndImageSize) {
   const TemporaryFolder folder;
-  write_mrcal_cameramodel(folder / "a.cameramodel",
-                          make_small_solution(LensModel::pinhole, {500.1, 501, 400, 300}), {});
+  write_cameramodel(folder / "a.cameramodel",
+                    make_small_solution(LensModel::pinhole, {500.1, 501, 400, 300}), {});
   const std::string text = TemporaryFolder::read_content(folder / "a.cameramodel");
   EXPECT_TRUE(
       text.starts_with("{\n"
@@ -66,7 +66,7 @@ TEST(WriteMrcalCameramodel, WritesLensWith17DigitsAndImageSize) {
 }
 
 /// Weights are divided by the noise.
-TEST(WriteMrcalCameramodel, WritesSolvedProblem) {
+TEST(WriteCameramodel, WritesSolvedProblem) {
   if (run_program("/usr/bin/python3 -c 'import numpy'").exit_code != 0) GTEST_SKIP() << "no numpy";
   std::string points;
   for (int i = 0; i < 12; ++i) {

@@ -36,8 +36,8 @@ TEST(ProjectionUncertainty, MaxProjectionSdIsLargerForFrontalThanForTiltedViews)
   ASSERT_TRUE(tilted.has_succeeded());
   ASSERT_TRUE(frontal.has_succeeded());
   const Eigen::Vector2d place(700, 80);
-  EXPECT_GT(ProjectionUncertainty(frontal).projection_sd_along_worst_direction_px(place),
-            5 * ProjectionUncertainty(tilted).projection_sd_along_worst_direction_px(place));
+  EXPECT_GT(ProjectionUncertainty(frontal).worst_direction_sd_px(place),
+            5 * ProjectionUncertainty(tilted).worst_direction_sd_px(place));
 }
 
 TEST(ProjectionUncertainty, IntrinsicsRegularizationBiasMatchesNegativeFocalLengthError) {
@@ -50,7 +50,7 @@ TEST(ProjectionUncertainty, IntrinsicsRegularizationBiasMatchesNegativeFocalLeng
   const auto solution = solve_intrinsics(views.input(30, random, 0.02));
   ASSERT_TRUE(solution.has_succeeded());
   const ProjectionUncertainty uncertainty(solution);
-  const Eigen::VectorXd& pull = uncertainty.intrinsics_regularization_bias();
+  const Eigen::VectorXd& pull = uncertainty.regularization_bias();
   const double focal_off_px = solution.problem.intrinsics[0] - wide[0];
   const double noise_px = std::sqrt(uncertainty.intrinsics_covariance()(0, 0));
   EXPECT_GT(std::abs(focal_off_px), 5 * noise_px);
@@ -64,8 +64,7 @@ TEST(ProjectionUncertainty, IntrinsicsRegularizationBiasIsZeroForFisheye) {
   input.lens_model = LensModel::fisheye;
   const auto solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.has_succeeded());
-  EXPECT_EQ(ProjectionUncertainty(solution).intrinsics_regularization_bias(),
-            Eigen::VectorXd::Zero(8));
+  EXPECT_EQ(ProjectionUncertainty(solution).regularization_bias(), Eigen::VectorXd::Zero(8));
 }
 
 TEST(ProjectionUncertainty, MaxProjectionSdMatchesMrcalForIndependentCorners) {
@@ -78,7 +77,7 @@ TEST(ProjectionUncertainty, MaxProjectionSdMatchesMrcalForIndependentCorners) {
     Random random(8);
     const auto solution = solve_intrinsics(views.input(20, random, 0.05));
     ASSERT_TRUE(solution.has_succeeded());
-    write_mrcal_cameramodel(folder / "camera.cameramodel", solution, {});
+    write_cameramodel(folder / "camera.cameramodel", solution, {});
     const auto mrcals =
         run_program("/usr/bin/python3 -c \"import mrcal, numpy as np; m = mrcal.cameramodel('" +
                     (folder / "camera.cameramodel").string() +
@@ -86,8 +85,7 @@ TEST(ProjectionUncertainty, MaxProjectionSdMatchesMrcalForIndependentCorners) {
                     "float), *m.intrinsics()), m, atinfinity = True, "
                     "what = 'worstdirection-stdev'))\"");
     ASSERT_EQ(mrcals.exit_code, 0) << mrcals.errors;
-    const double ours =
-        ProjectionUncertainty(solution).projection_sd_along_worst_direction_px({790, 10});
+    const double ours = ProjectionUncertainty(solution).worst_direction_sd_px({790, 10});
     EXPECT_NEAR(std::stod(mrcals.output), ours, 1e-6 * ours);
   }
 }
@@ -101,39 +99,37 @@ TEST(ProjectionUncertainty, SdByTagsMatchesSdByCornersForIndependentErrors) {
     ASSERT_TRUE(solution.has_succeeded());
     const ProjectionUncertainty by_corners(solution), by_tags(solution, input.lattice);
     for (const Eigen::Vector2d& pixel : {Eigen::Vector2d(400, 300), Eigen::Vector2d(40, 80)}) {
-      EXPECT_NEAR(by_tags.projection_sd_along_worst_direction_px(pixel) /
-                      by_corners.projection_sd_along_worst_direction_px(pixel),
-                  1, 0.2);
+      EXPECT_NEAR(by_tags.worst_direction_sd_px(pixel) / by_corners.worst_direction_sd_px(pixel), 1,
+                  0.2);
     }
   }
 }
 
-TEST(ComputeLensCalibrationReport, DifferenceOfHalvesMatchesTwiceExpectedRms) {
+TEST(MakeLensReport, DifferenceOfHalvesMatchesTwiceExpectedRms) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(5);
   const IntrinsicsInput input = views.input(24, random, 0.1);
   const IntrinsicsSolution solution = solve_intrinsics(input);
   ASSERT_TRUE(solution.has_succeeded());
-  const CalibrationReport report = compute_lens_calibration_report(solution, input);
+  const CalibrationReport report = make_lens_report(solution, input);
   ASSERT_TRUE(report.split_half_difference);
   // Twice the difference from the truth, within a factor for the few degrees of freedom.
   EXPECT_LT(report.split_half_difference->rms_px, 2.5 * 2 * report.expected_rms_px);
   EXPECT_GT(report.split_half_difference->rms_px, 0.3 * 2 * report.expected_rms_px);
 }
 
-TEST(EvaluateLensOnHeldOutViews, RmsOfHeldOutViewsMatchesCornerNoise) {
+TEST(FitHeldOutViews, RmsOfHeldOutViewsMatchesCornerNoise) {
   SyntheticViews views{synthetic_board(true), synthetic_lens()};
   views.warp_m = {0.0006, 0.0004};
   Random random(6);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(20, random, 0.05));
   ASSERT_TRUE(solution.has_succeeded());
-  const HeldOutFit held_out =
-      evaluate_lens_on_held_out_views(solution, views.input(6, random, 0.05));
+  const HeldOutFit held_out = fit_held_out_views(solution, views.input(6, random, 0.05));
   EXPECT_EQ(held_out.views, 6);
   EXPECT_NEAR(held_out.rms_px, 0.05, 0.006);
 }
 
-TEST(ComputeBoardViewCoverage, ReturnsTiltOnlyForSideNearerToCamera) {
+TEST(MeasureViewCoverage, ReturnsTiltOnlyForSideNearerToCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(9);
   const IntrinsicsInput input = views.input(12, random, 0);
@@ -141,7 +137,7 @@ TEST(ComputeBoardViewCoverage, ReturnsTiltOnlyForSideNearerToCamera) {
   ASSERT_TRUE(solution.has_succeeded());
   solution.problem.poses.resize(1);
   solution.problem.poses[0].rotation = {0, 0.3, 0};  // its right comes nearer
-  const auto [left, right, upper, lower] = compute_board_view_coverage(solution, input).tilts_rad;
+  const auto [left, right, upper, lower] = measure_view_coverage(solution, input).tilts_rad;
   EXPECT_EQ(left, 0);
   EXPECT_NEAR(right, 0.3, 1e-9);
   EXPECT_NEAR(upper, 0, 1e-9);
@@ -175,8 +171,7 @@ IntrinsicsSolution make_known_solution(const SyntheticViews& views, int count, d
     const Eigen::Vector3d half_m(field_m.x() / 2, field_m.y() / 2, 0);
     const BoardPose board{rotation.angle() * rotation.axis(), middle_m - rotation * half_m};
     for (std::size_t part = 0; part < lattice.num_board_parts(); ++part) {
-      const BoardPose& pose =
-          problem.poses.emplace_back(lattice.compute_board_part_pose(board, part));
+      const BoardPose& pose = problem.poses.emplace_back(lattice.compute_part_pose(board, part));
       for (int row = 0; row < problem.rows; ++row) {
         for (int col = 0; col < problem.cols; ++col) {
           const Eigen::Vector3d in_board_m(col * problem.spacing_m, row * problem.spacing_m, 0);
@@ -210,19 +205,19 @@ IntrinsicsSolution make_known_solution_of_board(bool kalibr, int count = 4, doub
 
 TEST(ProjectionUncertainty, IsInfiniteWhenViewHasNoCorners) {
   IntrinsicsSolution solution = make_known_solution_of_board(false, 3);
-  for (std::size_t i = 0; i < solution.problem.num_points_per_board(); ++i) {
+  for (std::size_t i = 0; i < solution.problem.points_per_board(); ++i) {
     solution.problem.points[i].z() = BoardProblem::kUnseen;
   }
   const ProjectionUncertainty uncertainty(solution);
-  EXPECT_FALSE(uncertainty.are_intrinsics_determined());
+  EXPECT_FALSE(uncertainty.is_determined());
   EXPECT_TRUE(std::isinf(uncertainty.focal_x_sd_px()));
-  EXPECT_TRUE(std::isinf(uncertainty.projection_sd_along_worst_direction_px({400, 300})));
+  EXPECT_TRUE(std::isinf(uncertainty.worst_direction_sd_px({400, 300})));
   EXPECT_TRUE(std::isinf(uncertainty.projection_covariance({400, 300})(0, 0)));
   const Eigen::MatrixXd covariance = uncertainty.intrinsics_covariance();
   ASSERT_EQ(covariance.rows(), 8);
   ASSERT_EQ(covariance.cols(), 8);
   EXPECT_TRUE(std::isinf(covariance.minCoeff()));
-  EXPECT_EQ(uncertainty.intrinsics_regularization_bias(), Eigen::VectorXd::Zero(8));
+  EXPECT_EQ(uncertainty.regularization_bias(), Eigen::VectorXd::Zero(8));
 }
 
 /// Returns a solution of boards with these rotations, one board per view.
@@ -234,7 +229,7 @@ IntrinsicsSolution make_solution_with_rotations(const std::vector<Eigen::Vector3
   return solution;
 }
 
-TEST(ComputeBoardViewCoverage, CountsCornersOfSolvedViewsInParts) {
+TEST(MeasureViewCoverage, CountsCornersOfSolvedViewsInParts) {
   IntrinsicsInput input{BoardLattice(synthetic_board(false)), {}, {900, 600}, LensModel::pinhole};
   const auto add_view = [&](const std::vector<Eigen::Vector2d>& pixels) {
     auto& view = input.views.emplace_back();
@@ -245,28 +240,27 @@ TEST(ComputeBoardViewCoverage, CountsCornersOfSolvedViewsInParts) {
   add_view({{299, 300}, {301, 590}, {890, 201}, {899, 399}, {890, 401}});
   IntrinsicsSolution solution = make_solution_with_rotations({});
   solution.views = {0, 2};
-  const ViewCoverage coverage = compute_board_view_coverage(solution, input);
+  const ViewCoverage coverage = measure_view_coverage(solution, input);
   EXPECT_EQ(coverage.corners, (std::array<int, 9>{1, 2, 1, 1, 0, 2, 0, 1, 1}));
   // Eight corners are in parts of 112.5 x 100 px of their own, two in one.
   EXPECT_NEAR(coverage.covered_fraction, 8.0 / 48, 1e-12);
   EXPECT_EQ(coverage.tilt_rad, 0);
 }
 
-TEST(ComputeBoardViewCoverage, TiltsAreLargestOfEachSideAndBetweenBoards) {
+TEST(MeasureViewCoverage, TiltsAreLargestOfEachSideAndBetweenBoards) {
   const IntrinsicsInput input{
       BoardLattice(synthetic_board(false)), {}, {900, 600}, LensModel::pinhole};
   // A positive rotation about y brings the right side nearer, about x the upper side.
-  const ViewCoverage coverage =
-      compute_board_view_coverage(make_solution_with_rotations({{0, 0.1, 0},
-                                                                {0, 0.4, 0},
-                                                                {0, 0.2, 0},
-                                                                {0, -0.3, 0},
-                                                                {0, -0.05, 0},
-                                                                {0.5, 0, 0},
-                                                                {0.15, 0, 0},
-                                                                {-0.25, 0, 0},
-                                                                {0, 0, 1}}),
-                                  input);
+  const ViewCoverage coverage = measure_view_coverage(make_solution_with_rotations({{0, 0.1, 0},
+                                                                                    {0, 0.4, 0},
+                                                                                    {0, 0.2, 0},
+                                                                                    {0, -0.3, 0},
+                                                                                    {0, -0.05, 0},
+                                                                                    {0.5, 0, 0},
+                                                                                    {0.15, 0, 0},
+                                                                                    {-0.25, 0, 0},
+                                                                                    {0, 0, 1}}),
+                                                      input);
   EXPECT_NEAR(coverage.tilts_rad[0], 0.3, 1e-12);
   EXPECT_NEAR(coverage.tilts_rad[1], 0.4, 1e-12);
   EXPECT_NEAR(coverage.tilts_rad[2], 0.5, 1e-12);
@@ -274,7 +268,7 @@ TEST(ComputeBoardViewCoverage, TiltsAreLargestOfEachSideAndBetweenBoards) {
   EXPECT_NEAR(coverage.tilt_rad, std::max(0.75, 0.7), 1e-12) << "from 0.5 to -0.25 about x";
 }
 
-TEST(RecommendNextBoardView, NamesEachPartAndSide) {
+TEST(RecommendNextView, NamesEachPartAndSide) {
   const std::array<std::string, 9> places{"top left",    "top middle",    "top right",
                                           "left middle", "middle",        "right middle",
                                           "bottom left", "bottom middle", "bottom right"};
@@ -285,13 +279,13 @@ TEST(RecommendNextBoardView, NamesEachPartAndSide) {
     coverage.corners[i] = 2;
     coverage.tilts_rad.fill(0.4);
     coverage.tilts_rad[i % 4] = 0.3;
-    EXPECT_EQ(recommend_next_board_view(coverage),
-              "the board in the " + places[i] + " of the image, its " + sides[i % 4] +
-                  " side 30 to 40 degrees nearer to the camera");
+    EXPECT_EQ(recommend_next_view(coverage), "the board in the " + places[i] +
+                                                 " of the image, its " + sides[i % 4] +
+                                                 " side 30 to 40 degrees nearer to the camera");
   }
 }
 
-TEST(EvaluateLensOnHeldOutViews, WeightsViewsByCornersAndSkipsViewsWithoutPose) {
+TEST(FitHeldOutViews, WeightsViewsByCornersAndSkipsViewsWithoutPose) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(6);
   IntrinsicsSolution solution{};
@@ -303,12 +297,12 @@ TEST(EvaluateLensOnHeldOutViews, WeightsViewsByCornersAndSkipsViewsWithoutPose) 
   held_out.views[1].resize(32);
   held_out.views.push_back(held_out.views[0]);
   held_out.views[2].resize(2);
-  const auto rms_px = compute_held_out_view_residual_rms_px(solution, held_out);
+  const auto rms_px = compute_held_out_rms_px(solution, held_out);
   ASSERT_EQ(rms_px.size(), 3U);
   EXPECT_NEAR(rms_px[0], 0.05, 0.015);
   EXPECT_NEAR(rms_px[1], 0.4, 0.12);
   EXPECT_TRUE(std::isinf(rms_px[2]));
-  const HeldOutFit fit = evaluate_lens_on_held_out_views(solution, held_out);
+  const HeldOutFit fit = fit_held_out_views(solution, held_out);
   const auto first = static_cast<double>(held_out.views[0].size());
   EXPECT_EQ(fit.views, 2);
   EXPECT_EQ(fit.corners, static_cast<int>(first) + 32);
@@ -316,7 +310,7 @@ TEST(EvaluateLensOnHeldOutViews, WeightsViewsByCornersAndSkipsViewsWithoutPose) 
   EXPECT_NEAR(fit.rms_px, std::sqrt(squares / (first + 32)), 1e-12);
 
   held_out.views.erase(held_out.views.begin(), held_out.views.begin() + 2);
-  const HeldOutFit none = evaluate_lens_on_held_out_views(solution, held_out);
+  const HeldOutFit none = fit_held_out_views(solution, held_out);
   EXPECT_EQ(none.views, 0);
   EXPECT_EQ(none.corners, 0);
   EXPECT_EQ(none.rms_px, 0);
@@ -336,7 +330,7 @@ TEST(ComputeHeldOutViewResidualRms, VanishesForShiftedEdgesOfWarpedBoard) {
       if (!kalibr) {
         for (TagDetection& tag : seen.tags) tag = shrunk(tag, 0.6);
       }
-      held_out.views.push_back(held_out.lattice.list_corners_with_board_positions(seen));
+      held_out.views.push_back(held_out.lattice.list_corners(seen));
     }
     IntrinsicsSolution solution{};
     solution.problem.lens_model = LensModel::opencv8;
@@ -344,11 +338,11 @@ TEST(ComputeHeldOutViewResidualRms, VanishesForShiftedEdgesOfWarpedBoard) {
                                    0.0002, -0.0001, -0.012, 0.01,  0.002, 0.0001};
     const Eigen::Vector2d ratio = held_out.lattice.board_to_part_warp_ratio();
     solution.problem.warp_m = views.warp_m.cwiseQuotient(ratio);
-    for (const double rms_px : compute_held_out_view_residual_rms_px(solution, held_out)) {
+    for (const double rms_px : compute_held_out_rms_px(solution, held_out)) {
       EXPECT_LT(rms_px, 0.02);
     }
     solution.problem.warp_m.setZero();
-    for (const double rms_px : compute_held_out_view_residual_rms_px(solution, held_out)) {
+    for (const double rms_px : compute_held_out_rms_px(solution, held_out)) {
       EXPECT_GT(rms_px, 0.1);
     }
   }
@@ -356,30 +350,29 @@ TEST(ComputeHeldOutViewResidualRms, VanishesForShiftedEdgesOfWarpedBoard) {
 
 void expect_report_matches_definitions(const IntrinsicsSolution& solution,
                                        const IntrinsicsInput& input) {
-  const CalibrationReport report = compute_lens_calibration_report(solution, input);
+  const CalibrationReport report = make_lens_report(solution, input);
   const ProjectionUncertainty by_tags(solution, input.lattice), by_corners(solution);
   const Lens lens = solution.fitted_lens();
-  const Eigen::MatrixXd by_views = estimate_intrinsics_covariance_by_jackknife(solution);
-  const ImageRegion region = compute_valid_lens_region(
-      collect_inlier_corner_pixels(solution.problem), input.imager_px, lens);
+  const Eigen::MatrixXd by_views = jackknife_covariance(solution);
+  const ImageRegion region =
+      make_valid_region(list_inlier_pixels(solution.problem), input.imager_px, lens);
   EXPECT_EQ(report.region, region);
-  EXPECT_EQ(report.region_fraction, compute_region_fraction_of_image_area(region, input.imager_px));
+  EXPECT_EQ(report.region_fraction, compute_area_fraction(region, input.imager_px));
   ASSERT_LT(report.region_fraction, 0.95);
   EXPECT_EQ(report.focal_sd_px, by_tags.focal_x_sd_px());
   EXPECT_EQ(report.focal_sd_by_views_px, std::sqrt(by_views(0, 0)));
   const bool is_splined = is_splined_lens_model(lens.lens_model());
   const ImageRegion compared = is_splined ? region : ImageRegion();
   const auto expected_rms_px = [&](const Eigen::MatrixXd& covariance) {
-    return compute_expected_projection_difference(lens, input.imager_px, covariance, compared)
-        .rms_px;
+    return predict_difference(lens, input.imager_px, covariance, compared).rms_px;
   };
   EXPECT_EQ(report.expected_rms_px, expected_rms_px(by_tags.intrinsics_covariance()));
   EXPECT_EQ(report.expected_by_views_rms_px, expected_rms_px(by_views));
 
   double sum = 0, count = 0, worst = 0, beyond = 0;
-  for (const auto& pixel : make_regular_pixel_grid(input.imager_px)) {
+  for (const auto& pixel : make_pixel_grid(input.imager_px)) {
     if (!lens.unproject_pixel(pixel)) continue;
-    const double sd = by_tags.projection_sd_along_worst_direction_px(pixel);
+    const double sd = by_tags.worst_direction_sd_px(pixel);
     if (polygon_contains(region, pixel)) {
       sum += sd;
       count += 1;
@@ -394,13 +387,12 @@ void expect_report_matches_definitions(const IntrinsicsSolution& solution,
   for (const Eigen::MatrixXd& covariance :
        {by_tags.intrinsics_covariance(), by_corners.intrinsics_covariance(), by_views}) {
     if (is_splined || !covariance.allFinite()) continue;
-    worst = std::max(worst, estimate_expected_max_projection_difference_px(lens, input.imager_px,
-                                                                           covariance, region));
+    worst = std::max(worst, predict_max_difference_px(lens, input.imager_px, covariance, region));
   }
   EXPECT_NEAR(report.uncertainty_worst_px, worst, 1e-12);
 
-  const IntrinsicsSolution even_views = solve_intrinsics_from_half_of_views(solution, 0);
-  const IntrinsicsSolution odd_views = solve_intrinsics_from_half_of_views(solution, 1);
+  const IntrinsicsSolution even_views = solve_half_of_views(solution, 0);
+  const IntrinsicsSolution odd_views = solve_half_of_views(solution, 1);
   ASSERT_EQ(report.split_half_difference.has_value(),
             even_views.has_succeeded() && odd_views.has_succeeded());
   if (!report.split_half_difference) return;
@@ -408,18 +400,18 @@ void expect_report_matches_definitions(const IntrinsicsSolution& solution,
   std::vector<ProjectionUncertainty> of_halves;
   if (is_splined) of_halves = {{even_views, input.lattice}, {odd_views, input.lattice}};
   int num_undetermined = 0;
-  const auto halves = compute_projection_difference(
-      even_views.fitted_lens(), odd_views.fitted_lens(), input.imager_px,
-      [&](const Eigen::Vector2d& pixel) {
-        const double sd_px = by_tags.projection_sd_along_worst_direction_px(pixel);
-        bool is_compared = polygon_contains(region, pixel);
-        for (const ProjectionUncertainty& half : of_halves) {
-          if (!is_compared) break;
-          is_compared = half.projection_sd_along_worst_direction_px(pixel) / sd_px <= 3;
-          if (!is_compared) ++num_undetermined;
-        }
-        return is_compared ? sd_px : std::numeric_limits<double>::infinity();
-      });
+  const auto halves =
+      compare_projections(even_views.fitted_lens(), odd_views.fitted_lens(), input.imager_px,
+                          [&](const Eigen::Vector2d& pixel) {
+                            const double sd_px = by_tags.worst_direction_sd_px(pixel);
+                            bool is_compared = polygon_contains(region, pixel);
+                            for (const ProjectionUncertainty& half : of_halves) {
+                              if (!is_compared) break;
+                              is_compared = half.worst_direction_sd_px(pixel) / sd_px <= 3;
+                              if (!is_compared) ++num_undetermined;
+                            }
+                            return is_compared ? sd_px : std::numeric_limits<double>::infinity();
+                          });
   EXPECT_EQ(num_undetermined > 0, is_splined);
   ASSERT_TRUE(halves);
   EXPECT_NEAR(report.split_half_difference->mean_px, halves->mean_px, 1e-9);
@@ -427,25 +419,25 @@ void expect_report_matches_definitions(const IntrinsicsSolution& solution,
   EXPECT_NEAR(report.split_half_difference->rms_px, halves->rms_px, 1e-9);
 }
 
-TEST(ComputeLensCalibrationReport, FieldsMatchTheirDefinitions) {
+TEST(MakeLensReport, FieldsMatchTheirDefinitions) {
   expect_report_matches_definitions(
       make_known_solution_of_board(false, 8),
       {BoardLattice(synthetic_board(false)), {}, {800, 600}, LensModel::opencv4});
 }
 
-TEST(ComputeLensCalibrationReport, HasNoSplitHalfDifferenceIfHalfHasTwoViews) {
+TEST(MakeLensReport, HasNoSplitHalfDifferenceIfHalfHasTwoViews) {
   const IntrinsicsInput input{
       BoardLattice(synthetic_board(false)), {}, {800, 600}, LensModel::opencv4};
   const IntrinsicsSolution solution = make_known_solution_of_board(false, 5);
-  ASSERT_TRUE(solve_intrinsics_from_half_of_views(solution, 0).has_succeeded());
-  EXPECT_FALSE(compute_lens_calibration_report(solution, input).split_half_difference);
+  ASSERT_TRUE(solve_half_of_views(solution, 0).has_succeeded());
+  EXPECT_FALSE(make_lens_report(solution, input).split_half_difference);
 }
 
-TEST(ComputeLensCalibrationReport, ComparesSplinedLensInItsRegionOnly) {
-  const LensModel model = lens_model_for_spline_grid({3, 9, 8, 95});
+TEST(MakeLensReport, ComparesSplinedLensInItsRegionOnly) {
+  const LensModel model = splined_lens_model({3, 9, 8, 95});
   std::vector<double> core{500, 500, 400, 300};
   const auto parameters =
-      fit_splined_lens_to_lens(Lens(LensModel::opencv4, kUncertainLens), {800, 600}, model, core);
+      fit_splined_lens(Lens(LensModel::opencv4, kUncertainLens), {800, 600}, model, core);
   ASSERT_TRUE(parameters);
   IntrinsicsSolution solution =
       make_known_solution({synthetic_board(false), Lens(model, *parameters)}, 8, 0.1, 12);

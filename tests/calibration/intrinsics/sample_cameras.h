@@ -26,9 +26,7 @@ inline Camera make_camera(LensModel model) {
 
 /// Returns a camera with a splined lens like one of 150 degrees.
 inline Camera splined_camera(const SplineGrid& grid = {3, 13, 11, 150}) {
-  return convert_camera_to_lens_model(make_camera(LensModel::fisheye),
-                                      lens_model_for_spline_grid(grid))
-      .camera;
+  return convert_lens_model(make_camera(LensModel::fisheye), splined_lens_model(grid)).camera;
 }
 
 }  // namespace vlp

@@ -28,12 +28,11 @@ double half_width(const SplineGrid& grid) { return 2 * std::tan(grid.fov_x_deg *
 
 /// A stereographic lens with other focal lengths and another center is a linear surface. Its second
 /// differences are 0, so that control points without rays continue it exactly.
-TEST(FitSplinedLensToLens, ReturnsExactControlPointsOfLinearSurface) {
+TEST(FitSplinedLens, ReturnsExactControlPointsOfLinearSurface) {
   const std::vector<double> core{300, 320, 390, 310};
   const Lens lens = make_stereographic(330, 304, 399, 304);
   for (const SplineGrid& grid : {SplineGrid{3, 11, 8, 150}, {2, 9, 12, 120}, {3, 8, 9, 220}}) {
-    const auto fitted =
-        fit_splined_lens_to_lens(lens, {800, 600}, lens_model_for_spline_grid(grid), core);
+    const auto fitted = fit_splined_lens(lens, {800, 600}, splined_lens_model(grid), core);
     ASSERT_TRUE(fitted);
     ASSERT_EQ(fitted->size(), 4 + 2 * grid.num_control_points());
     for (std::size_t k = 0; k < 4; ++k) EXPECT_EQ((*fitted)[k], core[k]);
@@ -50,14 +49,14 @@ TEST(FitSplinedLensToLens, ReturnsExactControlPointsOfLinearSurface) {
   }
 }
 
-TEST(FitSplinedLensToLens, MatchesRotatedFisheyeInImage) {
+TEST(FitSplinedLens, MatchesRotatedFisheyeInImage) {
   const Lens fisheye(LensModel::fisheye,
                      std::array{290.0, 291.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006});
   const Eigen::Matrix3d fisheye_from_splined =
       Eigen::AngleAxisd(0.1, Eigen::Vector3d(1, -2, 3).normalized()).toRotationMatrix();
-  constexpr LensModel model = lens_model_for_spline_grid({3, 16, 13, 180});
-  const auto fitted = fit_splined_lens_to_lens(fisheye, {800, 600}, model, {290, 291, 402, 297},
-                                               fisheye_from_splined);
+  constexpr LensModel model = splined_lens_model({3, 16, 13, 180});
+  const auto fitted =
+      fit_splined_lens(fisheye, {800, 600}, model, {290, 291, 402, 297}, fisheye_from_splined);
   ASSERT_TRUE(fitted);
   const Lens splined(model, *fitted);
   int compared = 0;
@@ -74,23 +73,20 @@ TEST(FitSplinedLensToLens, MatchesRotatedFisheyeInImage) {
   EXPECT_EQ(compared, 100);
 }
 
-TEST(ResizeSplineGridToReach, ReturnsSmallestGridThatCoversGivenExtent) {
+TEST(ResizeSplineGrid, ReturnsSmallestGridThatCoversGivenExtent) {
   const SplineGrid grid{3, 11, 9, 100};
   const double edge = 2 * std::tan(30 * kRadPerDeg);  // 120 degrees
-  EXPECT_EQ(resize_spline_grid_to_reach(grid, {edge, edge / 2}), (SplineGrid{3, 11, 7, 120}));
-  EXPECT_EQ(resize_spline_grid_to_reach(grid, {edge * 0.999, edge * 0.51}),
-            (SplineGrid{3, 11, 8, 120}));
-  EXPECT_EQ(resize_spline_grid_to_reach(grid, {edge * 1.001, edge * 2}),
-            (SplineGrid{3, 11, 19, 121}));
-  EXPECT_EQ(resize_spline_grid_to_reach({2, 12, 5, 60}, {edge, edge / 4}),
-            (SplineGrid{2, 12, 5, 120}));
+  EXPECT_EQ(resize_spline_grid(grid, {edge, edge / 2}), (SplineGrid{3, 11, 7, 120}));
+  EXPECT_EQ(resize_spline_grid(grid, {edge * 0.999, edge * 0.51}), (SplineGrid{3, 11, 8, 120}));
+  EXPECT_EQ(resize_spline_grid(grid, {edge * 1.001, edge * 2}), (SplineGrid{3, 11, 19, 121}));
+  EXPECT_EQ(resize_spline_grid({2, 12, 5, 60}, {edge, edge / 4}), (SplineGrid{2, 12, 5, 120}));
 }
 
 /// Image corners are 400 / 300 and 300 / 300 from the center in the stereographic plane.
-TEST(DescribeTooCoarseSplineGrid, NamesGridThatCoversImageAndAnglesOffAxis) {
+TEST(ExplainCoarseGrid, NamesGridThatCoversImageAndAnglesOffAxis) {
   const Lens lens = make_stereographic(300, 300, 400, 300);
-  EXPECT_EQ(describe_too_coarse_spline_grid(
-                lens, {801, 601}, lens_model_for_spline_grid({3, 4, 4, 300}), {300, 300, 400, 300}),
+  EXPECT_EQ(explain_coarse_grid(lens, {801, 601}, splined_lens_model({3, 4, 4, 300}),
+                                {300, 300, 400, 300}),
             "the control points of LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=4_Ny=4_fov_x_deg=300 "
             "do not cover the field of view, 67 degrees off axis horizontally and 53 vertically: "
             "use --lens LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=4_Ny=4_fov_x_deg=140");

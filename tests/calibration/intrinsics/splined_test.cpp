@@ -17,7 +17,7 @@
 namespace vlp {
 namespace {
 
-constexpr LensModel kSplined = lens_model_for_spline_grid({3, 14, 14, 205});
+constexpr LensModel kSplined = splined_lens_model({3, 14, 14, 205});
 
 /// Returns boards all over the image of a lens with rays up to 100 degrees off its axis.
 IntrinsicsInput splined_input(int count, Random& random, double noise_px) {
@@ -32,20 +32,20 @@ TEST(SolveSplinedLens, MatchesTrueLensUpTo94DegreesOffAxis) {
   Random random(18);
   const auto input = splined_input(40, random, noise_px);
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.has_succeeded()) << describe_intrinsics_status(solution.status);
+  ASSERT_TRUE(solution.has_succeeded()) << describe_status(solution.status);
   EXPECT_EQ(solution.views.size(), 40U);
   EXPECT_FALSE(solution.solved_parameters.core);
   EXPECT_NEAR(solution.rms_px, noise_px, 0.003);
   EXPECT_NEAR(solution.problem.noise_px, noise_px, 0.005);
   EXPECT_LT(up_to(90, solution.fitted_lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.fitted_lens()).worst_px, 0.1);
-  const CalibrationReport report = compute_lens_calibration_report(solution, input);
+  const CalibrationReport report = make_lens_report(solution, input);
   EXPECT_LT(report.uncertainty_mean_px, 0.05);
   ASSERT_TRUE(report.split_half_difference);
   EXPECT_LT(report.split_half_difference->mean_px, 0.1);
   // The frame is that of the true lens, which is symmetric.
-  const auto turn = fit_rotation_between_lenses(wide_lens(), solution.fitted_lens(),
-                                                collect_inlier_corner_pixels(solution.problem));
+  const auto turn =
+      fit_lens_rotation(wide_lens(), solution.fitted_lens(), list_inlier_pixels(solution.problem));
   ASSERT_TRUE(turn);
   EXPECT_LT(Eigen::AngleAxisd(*turn).angle() * 180 / std::numbers::pi, 0.02);
   EXPECT_NEAR(solution.fitted_lens().principal_point_px().x(), 501, 0.2);
@@ -75,7 +75,7 @@ TEST(SolveSplinedLens, RejectsWholeTagsWithDisplacedEdgeAsOutliers) {
     corners[farthest + 1].pixel.x() += displacement_px;
   }
   const IntrinsicsSolution solution = solve_intrinsics(input);
-  ASSERT_TRUE(solution.has_succeeded()) << describe_intrinsics_status(solution.status);
+  ASSERT_TRUE(solution.has_succeeded()) << describe_status(solution.status);
   EXPECT_GE(solution.outliers, 20);  // the tags whole
   EXPECT_LT(up_to(90, solution.fitted_lens()).mean_px, 0.03);
   EXPECT_LT(up_to(94, solution.fitted_lens()).worst_px, 0.15);
@@ -84,7 +84,7 @@ TEST(SolveSplinedLens, RejectsWholeTagsWithDisplacedEdgeAsOutliers) {
 TEST(SolveSplinedLens, FailsWhenGridIsNarrowerThanFieldOfView) {
   Random random(19);
   IntrinsicsInput input = splined_input(12, random, 0.05);
-  input.lens_model = lens_model_for_spline_grid({3, 10, 10, 120});
+  input.lens_model = splined_lens_model({3, 10, 10, 120});
   const IntrinsicsSolution solution = solve_intrinsics(input);
   EXPECT_FALSE(solution.has_succeeded());
 }
@@ -97,9 +97,9 @@ TEST(SolveSplinedLens, RejectsOnlyDisplacedTagsWhenFisheyeModelFitsPoorly) {
   Random random(18);
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   IntrinsicsInput input = views.input(count, random, noise_px);
-  input.lens_model = lens_model_for_spline_grid({3, 14, 11, 90});
+  input.lens_model = splined_lens_model({3, 14, 11, 90});
   const IntrinsicsSolution good = solve_intrinsics(input);
-  ASSERT_TRUE(good.has_succeeded()) << describe_intrinsics_status(good.status);
+  ASSERT_TRUE(good.has_succeeded()) << describe_status(good.status);
   EXPECT_EQ(good.outliers, 0);
   for (std::size_t view = 0; view < count; view += 8) {
     auto& corners = input.views[view];
@@ -114,11 +114,11 @@ TEST(SolveSplinedLens, RejectsOnlyDisplacedTagsWhenFisheyeModelFitsPoorly) {
     corners[farthest + 1].pixel.x() += displacement_px;
   }
   const IntrinsicsSolution slipped = solve_intrinsics(input);
-  ASSERT_TRUE(slipped.has_succeeded()) << describe_intrinsics_status(slipped.status);
+  ASSERT_TRUE(slipped.has_succeeded()) << describe_status(slipped.status);
   EXPECT_GE(slipped.outliers, 20);  // the tags whole
-  const ImageRegion region = compute_valid_lens_region(
-      collect_inlier_corner_pixels(slipped.problem), input.imager_px, slipped.fitted_lens());
-  const auto difference = compute_projection_difference(
+  const ImageRegion region = make_valid_region(list_inlier_pixels(slipped.problem), input.imager_px,
+                                               slipped.fitted_lens());
+  const auto difference = compare_projections(
       views.lens, slipped.fitted_lens(), input.imager_px, [&](const Eigen::Vector2d& pixel) {
         return polygon_contains(region, pixel) ? 1.0 : INFINITY;
       });
@@ -131,9 +131,8 @@ TEST(SolveSplinedLens, RejectsOnlyDisplacedTagsWhenFisheyeModelFitsPoorly) {
 Eigen::Vector3d mean_turn(const IntrinsicsSolution& from, const IntrinsicsSolution& to) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < from.problem.poses.size(); ++i) {
-    const Eigen::AngleAxisd turn(
-        rotation_matrix_from_rotation_vector(to.problem.poses[i].rotation) *
-        rotation_matrix_from_rotation_vector(from.problem.poses[i].rotation).transpose());
+    const Eigen::AngleAxisd turn(rotation_from_vector(to.problem.poses[i].rotation) *
+                                 rotation_from_vector(from.problem.poses[i].rotation).transpose());
     sum += turn.angle() * turn.axis();
   }
   return sum / static_cast<double>(from.problem.poses.size());
@@ -145,7 +144,7 @@ TEST(ProjectionUncertainty, ProjectionCovarianceMatchesScatterOfSplinedLens) {
   constexpr double noise_px = 0.1;
   Random of_boards(41);
   IntrinsicsInput exact = splined_input(16, of_boards, 0);
-  exact.lens_model = lens_model_for_spline_grid({3, 10, 10, 205});
+  exact.lens_model = splined_lens_model({3, 10, 10, 205});
   exact.warp = WarpChoice::off;
   const auto solved = [&](std::uint64_t seed) {
     IntrinsicsInput input = exact;
@@ -168,14 +167,14 @@ TEST(ProjectionUncertainty, ProjectionCovarianceMatchesScatterOfSplinedLens) {
   const ProjectionUncertainty uncertainty(first);
   const Lens lens = first.fitted_lens();
   double squares = 0, freedoms = 0;
-  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(kWideImager)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(kWideImager)) {
     const auto ray = lens.unproject_pixel(pixel);
     if (!ray || ray->direction.normalized().z() < 0) continue;
     std::vector<Eigen::Vector2d> seen;
     Eigen::Vector2d mean(0, 0);
     for (const IntrinsicsSolution& solution : solutions) {
       const Eigen::Vector3d turned =
-          rotation_matrix_from_rotation_vector(mean_turn(first, solution)) * ray->direction;
+          rotation_from_vector(mean_turn(first, solution)) * ray->direction;
       seen.push_back(solution.fitted_lens().project_point(turned).value());
       mean += seen.back() / seeds;
     }

@@ -26,7 +26,7 @@ inline Board synthetic_board(bool kalibr) {
           {false, BoardCorner::bottom_left}};
 }
 
-/// Uniform standard deviation for compute_projection_difference().
+/// Uniform standard deviation for compare_projections().
 inline double even(const Eigen::Vector2d&) { return 1; }
 
 /// Returns a lens with strong distortion, for 800 x 600 px.
@@ -117,8 +117,8 @@ struct SyntheticViews {
     IntrinsicsInput input{BoardLattice(board), {}, imager_px, lens.lens_model()};
     while (static_cast<int>(input.views.size()) < views) {
       const BoardDetection seen = random_view(random, noise_px);
-      if (input.lattice.are_corners_sufficient_for_pose(seen))
-        input.views.push_back(input.lattice.list_corners_with_board_positions(seen));
+      if (input.lattice.can_determine_pose(seen))
+        input.views.push_back(input.lattice.list_corners(seen));
     }
     return input;
   }

@@ -85,44 +85,42 @@ double worst_px(const std::vector<BoardView>& views, const std::vector<BoardView
 }
 
 /// Also with more views than are used.
-TEST(EstimateAndCorrectToneCurve, ReturnsTrueGammaWhenGrayValuesIndicateAnother) {
+TEST(CorrectToneCurve, ReturnsTrueGammaWhenGrayValuesIndicateAnother) {
   for (const auto& [gamma, levels_gamma, count] : {std::tuple{2.0, 1.5, 40}, {1.5, 2.2, 16}}) {
     const CodedCamera camera{gamma, levels_gamma};
     auto views = camera.views(count, 1);
     const auto truth = camera.uncoded(count, 1);
     EXPECT_GT(worst_px(views, truth), 0.2);
-    EXPECT_NEAR(std::log(estimate_and_correct_tone_curve(views, synthetic_board(false)) / gamma), 0,
-                0.04);
+    EXPECT_NEAR(std::log(correct_tone_curve(views, synthetic_board(false)) / gamma), 0, 0.04);
     EXPECT_LT(worst_px(views, truth), 0.05);
     EXPECT_TRUE(views[0].detection.tags[0].tone_curve_fits.empty());
   }
 }
 
 /// Images without the board do not count.
-TEST(EstimateAndCorrectToneCurve, ReturnsTrueGammaWhenMostViewsLackBoard) {
+TEST(CorrectToneCurve, ReturnsTrueGammaWhenMostViewsLackBoard) {
   auto views = CodedCamera{2, 1.5}.views(12, 1);
   views.resize(30, {"none", {800, 600}, {}});
-  EXPECT_NEAR(std::log(estimate_and_correct_tone_curve(views, synthetic_board(false)) / 2), 0,
-              0.04);
+  EXPECT_NEAR(std::log(correct_tone_curve(views, synthetic_board(false)) / 2), 0, 0.04);
 }
 
-TEST(EstimateAndCorrectToneCurve, ReturnsOneWhenOnlyGrayValuesIndicateCurve) {
+TEST(CorrectToneCurve, ReturnsOneWhenOnlyGrayValuesIndicateCurve) {
   auto views = CodedCamera{1, 1.46}.views(16, 2);
   const auto before = views;
-  EXPECT_EQ(estimate_and_correct_tone_curve(views, synthetic_board(false)), 1);
+  EXPECT_EQ(correct_tone_curve(views, synthetic_board(false)), 1);
   EXPECT_EQ(views[5].detection.tags[3].corners_px, before[5].detection.tags[3].corners_px);
 }
 
 /// With any curve the corners then lie on a board, once the shift is corrected.
-TEST(EstimateAndCorrectToneCurve, ReturnsEstimateFromGrayValuesWhenEqualEdgeShiftsHideTrueGamma) {
+TEST(CorrectToneCurve, ReturnsEstimateFromGrayValuesWhenEqualEdgeShiftsHideTrueGamma) {
   for (const double levels_gamma : {1.4, 2.2}) {
     auto views = CodedCamera{1.8, levels_gamma, 0}.views(16, 3);
-    const double gamma = estimate_and_correct_tone_curve(views, synthetic_board(false));
+    const double gamma = correct_tone_curve(views, synthetic_board(false));
     EXPECT_NEAR(std::log(gamma / levels_gamma), 0, 0.05) << gamma;
   }
 }
 
-TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesIfCornerSdsAreUnknownOrNoLensFits) {
+TEST(CorrectToneCurve, ReturnsGammaOfGrayValuesIfCornerSdsAreUnknownOrNoLensFits) {
   const Board board = synthetic_board(false);
   auto without_noise = CodedCamera{2, 1.5}.views(8, 4), of_another = without_noise;
   for (BoardView& view : without_noise) {
@@ -131,33 +129,33 @@ TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesIfCornerSdsAreUnknownO
       for (auto& outline : tag.tone_curve_fits) outline.corner_sds_px.fill(0);
     }
   }
-  EXPECT_NEAR(estimate_and_correct_tone_curve(without_noise, board), 1.5, 1e-9);
+  EXPECT_NEAR(correct_tone_curve(without_noise, board), 1.5, 1e-9);
   Board other = board;
   other.tag_spacing = 0.7;
-  EXPECT_NEAR(estimate_and_correct_tone_curve(of_another, other), 1.5, 1e-9);
+  EXPECT_NEAR(correct_tone_curve(of_another, other), 1.5, 1e-9);
   auto few = CodedCamera{1, 1.5}.views(2, 4);
-  EXPECT_NEAR(estimate_and_correct_tone_curve(few, board), 1.5, 1e-9);
+  EXPECT_NEAR(correct_tone_curve(few, board), 1.5, 1e-9);
   std::vector<BoardView> none;
-  EXPECT_EQ(estimate_and_correct_tone_curve(none, board), 1);
+  EXPECT_EQ(correct_tone_curve(none, board), 1);
 }
 
-TEST(EstimateAndCorrectToneCurve, ReturnsGammaOfGrayValuesIfHalfOfViewsLackToneCurveFits) {
+TEST(CorrectToneCurve, ReturnsGammaOfGrayValuesIfHalfOfViewsLackToneCurveFits) {
   auto views = CodedCamera{1, 1.5}.views(4, 5);
   for (const BoardView& view : CodedCamera{1, 1}.views(4, 6)) {
     views.push_back(view);
     views.back().detection.curve_costs = {0, 40};
     for (TagDetection& tag : views.back().detection.tags) tag.tone_curve_fits.clear();
   }
-  const double by_levels = estimate_tone_curve_gamma(sum_tone_curve_costs(views));
+  const double by_levels = estimate_gamma(sum_tone_curve_costs(views));
   EXPECT_GT(by_levels, 1.2);
-  EXPECT_NEAR(estimate_and_correct_tone_curve(views, synthetic_board(false)), by_levels, 1e-9);
+  EXPECT_NEAR(correct_tone_curve(views, synthetic_board(false)), by_levels, 1e-9);
 }
 
-TEST(EstimateAndCorrectToneCurve, ReturnsOneWhenViewsAreAlreadyCorrected) {
+TEST(CorrectToneCurve, ReturnsOneWhenViewsAreAlreadyCorrected) {
   auto views = CodedCamera{2, 2}.views(8, 7);
-  estimate_and_correct_tone_curve(views, synthetic_board(false));
+  correct_tone_curve(views, synthetic_board(false));
   const auto once = views[0].detection.tags[0].corners_px;
-  EXPECT_EQ(estimate_and_correct_tone_curve(views, synthetic_board(false)), 1);
+  EXPECT_EQ(correct_tone_curve(views, synthetic_board(false)), 1);
   EXPECT_EQ(views[0].detection.tags[0].corners_px, once);
 }
 
@@ -165,7 +163,7 @@ TEST(EstimateLens, ReturnsAllViewsCorrectedForEstimatedToneCurve) {
   const Board board = synthetic_board(false);
   const std::vector<BoardView> views = CodedCamera{1.8, 1.8}.views(12, 3);
   std::vector<BoardView> expected = views;
-  const double gamma = estimate_and_correct_tone_curve(expected, board);
+  const double gamma = correct_tone_curve(expected, board);
   LensViews input;
   input.views = views;
   input.board = board;

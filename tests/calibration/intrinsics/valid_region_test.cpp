@@ -27,11 +27,11 @@ Lens straight_lens() {
   return {LensModel::opencv8, parameters};
 }
 
-TEST(ComputeValidLensRegion, ReturnsConvexHullOfCornersWithMargin) {
-  const ImageRegion region = compute_valid_lens_region(
+TEST(MakeValidRegion, ReturnsConvexHullOfCornersWithMargin) {
+  const ImageRegion region = make_valid_region(
       {{200, 100}, {600, 100}, {400, 250}, {600, 500}, {200, 500}}, kImager, straight_lens());
   EXPECT_EQ(region.size(), 4U);
-  EXPECT_NEAR(compute_region_fraction_of_image_area(region, kImager),
+  EXPECT_NEAR(compute_area_fraction(region, kImager),
               (400 + 2 * kMargin) * (400 + 2 * kMargin) / (800 * 600), 1e-12);
   EXPECT_TRUE(polygon_contains(region, {161, 61}));
   EXPECT_TRUE(polygon_contains(region, {160, 300}));
@@ -39,10 +39,10 @@ TEST(ComputeValidLensRegion, ReturnsConvexHullOfCornersWithMargin) {
   EXPECT_FALSE(polygon_contains(region, {400, 541}));
 }
 
-TEST(ComputeValidLensRegion, ClipsRegionToImage) {
+TEST(MakeValidRegion, ClipsRegionToImage) {
   const ImageRegion region =
-      compute_valid_lens_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}}, kImager, straight_lens());
-  EXPECT_NEAR(compute_region_fraction_of_image_area(region, kImager), 1, 1e-12);
+      make_valid_region({{5, 5}, {790, 5}, {790, 590}, {5, 590}}, kImager, straight_lens());
+  EXPECT_NEAR(compute_area_fraction(region, kImager), 1, 1e-12);
   for (const Eigen::Vector2d& corner : region) {
     EXPECT_TRUE(corner.x() == 0 || corner.x() == 800);
     EXPECT_TRUE(corner.y() == 0 || corner.y() == 600);
@@ -50,11 +50,11 @@ TEST(ComputeValidLensRegion, ClipsRegionToImage) {
   EXPECT_TRUE(polygon_contains(region, {800, 600}));
 }
 
-TEST(ComputeValidLensRegion, ReturnsEmptyRegionForCollinearCorners) {
-  EXPECT_TRUE(compute_valid_lens_region({}, kImager, straight_lens()).empty());
-  EXPECT_TRUE(compute_valid_lens_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, straight_lens())
-                  .empty());
-  EXPECT_EQ(compute_region_fraction_of_image_area({}, kImager), 0);
+TEST(MakeValidRegion, ReturnsEmptyRegionForCollinearCorners) {
+  EXPECT_TRUE(make_valid_region({}, kImager, straight_lens()).empty());
+  EXPECT_TRUE(
+      make_valid_region({{1, 1}, {2, 2}, {3, 3}, {9, 9}}, kImager, straight_lens()).empty());
+  EXPECT_EQ(compute_area_fraction({}, kImager), 0);
 }
 
 /// Matches a region with these vertices, up to rounding.
@@ -70,62 +70,56 @@ Lens splined_lens() {
   constexpr SplineGrid grid{3, 10, 8, 100};
   std::vector<double> parameters{1000, 1000, 400, 300};
   parameters.resize(4 + 2 * grid.num_control_points());
-  return {lens_model_for_spline_grid(grid), parameters};
+  return {splined_lens_model(grid), parameters};
 }
 
-TEST(ComputeValidLensRegion, ReturnsHullVerticesClockwiseFromLeftmostForSplinedLens) {
+TEST(MakeValidRegion, ReturnsHullVerticesClockwiseFromLeftmostForSplinedLens) {
   const ImageRegion vertices{{100, 120}, {350, 40}, {700, 150}, {650, 500}, {120, 480}};
   ImageRegion corners = vertices;
   corners.insert(corners.end(), {{300, 300}, {110, 300}, {640, 480}, {225, 80}, {400, 200}});
   std::reverse(corners.begin(), corners.end());
-  EXPECT_THAT(compute_valid_lens_region(corners, kImager, splined_lens()),
+  EXPECT_THAT(make_valid_region(corners, kImager, splined_lens()),
               testing::ElementsAreArray(vertices));
-  EXPECT_GT(compute_valid_lens_region(corners, kImager, straight_lens()).front().y(), 79);
-  EXPECT_LT(compute_valid_lens_region(corners, kImager, straight_lens()).front().x(), 61);
+  EXPECT_GT(make_valid_region(corners, kImager, straight_lens()).front().y(), 79);
+  EXPECT_LT(make_valid_region(corners, kImager, straight_lens()).front().x(), 61);
 }
 
-TEST(ComputeValidLensRegion, ReturnsTriangleForThreeCornersAndEmptyRegionForTwo) {
-  EXPECT_THAT(
-      compute_valid_lens_region({{300, 50}, {100, 150}, {350, 250}}, kImager, splined_lens()),
-      testing::ElementsAreArray(ImageRegion{{100, 150}, {300, 50}, {350, 250}}));
-  EXPECT_TRUE(compute_valid_lens_region({{300, 50}, {100, 150}}, kImager, straight_lens()).empty());
-  EXPECT_TRUE(compute_valid_lens_region({{300, 50}}, kImager, straight_lens()).empty());
+TEST(MakeValidRegion, ReturnsTriangleForThreeCornersAndEmptyRegionForTwo) {
+  EXPECT_THAT(make_valid_region({{300, 50}, {100, 150}, {350, 250}}, kImager, splined_lens()),
+              testing::ElementsAreArray(ImageRegion{{100, 150}, {300, 50}, {350, 250}}));
+  EXPECT_TRUE(make_valid_region({{300, 50}, {100, 150}}, kImager, straight_lens()).empty());
+  EXPECT_TRUE(make_valid_region({{300, 50}}, kImager, straight_lens()).empty());
 }
 
 /// Triangles with one vertex 100 px beyond a border and two vertices inside the image.
-TEST(ComputeValidLensRegion, ReplacesVertexBeyondBorderByCrossingsWithBorder) {
-  EXPECT_THAT(
-      compute_valid_lens_region({{-100, 300}, {400, 100}, {400, 500}}, kImager, splined_lens()),
-      testing::UnorderedElementsAreArray(
-          near_vertices({{0, 260}, {400, 100}, {400, 500}, {0, 340}})));
-  EXPECT_THAT(
-      compute_valid_lens_region({{900, 200}, {400, 100}, {400, 500}}, kImager, splined_lens()),
-      testing::UnorderedElementsAreArray(
-          near_vertices({{800, 180}, {400, 100}, {400, 500}, {800, 260}})));
-  EXPECT_THAT(
-      compute_valid_lens_region({{300, -100}, {100, 300}, {700, 400}}, kImager, splined_lens()),
-      testing::UnorderedElementsAreArray(
-          near_vertices({{250, 0}, {100, 300}, {700, 400}, {380, 0}})));
-  EXPECT_THAT(
-      compute_valid_lens_region({{300, 700}, {100, 300}, {700, 500}}, kImager, splined_lens()),
-      testing::UnorderedElementsAreArray(
-          near_vertices({{250, 600}, {100, 300}, {700, 500}, {500, 600}})));
+TEST(MakeValidRegion, ReplacesVertexBeyondBorderByCrossingsWithBorder) {
+  EXPECT_THAT(make_valid_region({{-100, 300}, {400, 100}, {400, 500}}, kImager, splined_lens()),
+              testing::UnorderedElementsAreArray(
+                  near_vertices({{0, 260}, {400, 100}, {400, 500}, {0, 340}})));
+  EXPECT_THAT(make_valid_region({{900, 200}, {400, 100}, {400, 500}}, kImager, splined_lens()),
+              testing::UnorderedElementsAreArray(
+                  near_vertices({{800, 180}, {400, 100}, {400, 500}, {800, 260}})));
+  EXPECT_THAT(make_valid_region({{300, -100}, {100, 300}, {700, 400}}, kImager, splined_lens()),
+              testing::UnorderedElementsAreArray(
+                  near_vertices({{250, 0}, {100, 300}, {700, 400}, {380, 0}})));
+  EXPECT_THAT(make_valid_region({{300, 700}, {100, 300}, {700, 500}}, kImager, splined_lens()),
+              testing::UnorderedElementsAreArray(
+                  near_vertices({{250, 600}, {100, 300}, {700, 500}, {500, 600}})));
 }
 
-TEST(ComputeValidLensRegion, ReturnsWholeImageForRegionAbove98Point5Percent) {
+TEST(MakeValidRegion, ReturnsWholeImageForRegionAbove98Point5Percent) {
   const ImageRegion smaller{{0, 0}, {787, 0}, {787, 600}, {0, 600}};
-  EXPECT_THAT(compute_valid_lens_region(smaller, kImager, splined_lens()),
+  EXPECT_THAT(make_valid_region(smaller, kImager, splined_lens()),
               testing::ElementsAreArray(smaller));
-  EXPECT_THAT(
-      compute_valid_lens_region({{0, 0}, {789, 0}, {789, 600}, {0, 600}}, kImager, splined_lens()),
-      testing::ElementsAreArray(ImageRegion{{0, 0}, {800, 0}, {800, 600}, {0, 600}}));
+  EXPECT_THAT(make_valid_region({{0, 0}, {789, 0}, {789, 600}, {0, 600}}, kImager, splined_lens()),
+              testing::ElementsAreArray(ImageRegion{{0, 0}, {800, 0}, {800, 600}, {0, 600}}));
 }
 
 /// Expects that every pixel of the region has a ray: those of a grid, and of the boundary.
 void expect_all_rays(const ImageRegion& region, const Lens& lens) {
   ASSERT_GE(region.size(), 3U);
   int inside = 0;
-  for (const Eigen::Vector2d& pixel : make_regular_pixel_grid(kImager, 161)) {
+  for (const Eigen::Vector2d& pixel : make_pixel_grid(kImager, 161)) {
     if (!polygon_contains(region, pixel)) continue;
     ++inside;
     EXPECT_TRUE(lens.unproject_pixel(pixel)) << pixel.transpose();
@@ -142,7 +136,7 @@ void expect_all_rays(const ImageRegion& region, const Lens& lens) {
 
 /// The models fold within the image: OPENCV_FISHEYE 307 px from its center, where its distance
 /// stops growing; OPENCVn with and without tangential and prism terms.
-TEST(ComputeValidLensRegion, LiesInsideImageOfRaysOfLensWithFold) {
+TEST(MakeValidRegion, LiesInsideImageOfRaysOfLensWithFold) {
   const std::array lenses{
       Lens(LensModel::fisheye, std::array{188.0, 192.0, 400.0, 300.0, 0.0, 0.0, -0.003, 0.0}),
       Lens(LensModel::opencv4, std::array{400.0, 400.0, 410.0, 290.0, -0.4, 0.0, 0.0, 0.0}),
@@ -162,7 +156,7 @@ TEST(ComputeValidLensRegion, LiesInsideImageOfRaysOfLensWithFold) {
       max_px = std::max(max_px, reach_px);
       corners.emplace_back(lens.principal_point_px() + 0.96 * reach_px * direction);
     }
-    const ImageRegion region = compute_valid_lens_region(corners, kImager, lens);
+    const ImageRegion region = make_valid_region(corners, kImager, lens);
     expect_all_rays(region, lens);
     // No more than necessary is cut off: all corners remain.
     for (const Eigen::Vector2d& corner : corners) {
@@ -174,35 +168,33 @@ TEST(ComputeValidLensRegion, LiesInsideImageOfRaysOfLensWithFold) {
   }
 }
 
-TEST(ComputeValidLensRegion, LiesInsideImagesOfRaysOfOtherLenses) {
+TEST(MakeValidRegion, LiesInsideImagesOfRaysOfOtherLenses) {
   const std::array others{
       Lens(LensModel::fisheye, std::array{188.0, 192.0, 400.0, 300.0, 0.0, 0.0, -0.003, 0.0}),
       straight_lens()};
   const ImageRegion corners{{150, 150}, {650, 150}, {650, 450}, {150, 450}};
-  const ImageRegion region = compute_valid_lens_region(corners, kImager, straight_lens(), others);
+  const ImageRegion region = make_valid_region(corners, kImager, straight_lens(), others);
   expect_all_rays(region, others[0]);
-  EXPECT_EQ(region, compute_valid_lens_region(corners, kImager, others[0]));
-  EXPECT_NE(region, compute_valid_lens_region(corners, kImager, straight_lens()));
+  EXPECT_EQ(region, make_valid_region(corners, kImager, others[0]));
+  EXPECT_NE(region, make_valid_region(corners, kImager, straight_lens()));
 }
 
 /// Most corners are beyond the fold, 307 px from the center, and have no ray.
-TEST(ComputeValidLensRegion, LiesInsideImageOfRaysIfMeanOfCornersHasNoRay) {
+TEST(MakeValidRegion, LiesInsideImageOfRaysIfMeanOfCornersHasNoRay) {
   const Lens lens(LensModel::fisheye,
                   std::array{188.0, 192.0, 400.0, 300.0, 0.0, 0.0, -0.003, 0.0});
   ImageRegion corners{{5, 5}, {60, 5}, {5, 60}, {30, 30}, {8, 40}, {40, 8}};
-  EXPECT_TRUE(compute_valid_lens_region(corners, kImager, lens).empty());
+  EXPECT_TRUE(make_valid_region(corners, kImager, lens).empty());
   corners.insert(corners.end(), {{300, 200}, {500, 200}, {400, 400}});
   ASSERT_FALSE(lens.unproject_pixel({150, 105})) << "mean of the corners";
-  const ImageRegion region = compute_valid_lens_region(corners, kImager, lens);
+  const ImageRegion region = make_valid_region(corners, kImager, lens);
   expect_all_rays(region, lens);
   for (std::size_t i = 6; i < corners.size(); ++i)
     EXPECT_TRUE(polygon_contains(region, corners[i])) << i;
 }
 
-TEST(ComputeRegionFractionOfImageArea, ReturnsAreaDividedByAreaBetweenPixelCenters) {
-  EXPECT_NEAR(
-      compute_region_fraction_of_image_area({{0, 0}, {20, 0}, {20, 30}, {0, 30}}, {101, 61}), 0.1,
-      1e-12);
+TEST(ComputeAreaFraction, ReturnsAreaDividedByAreaBetweenPixelCenters) {
+  EXPECT_NEAR(compute_area_fraction({{0, 0}, {20, 0}, {20, 30}, {0, 30}}, {101, 61}), 0.1, 1e-12);
 }
 
 }  // namespace

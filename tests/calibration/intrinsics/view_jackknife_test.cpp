@@ -29,13 +29,13 @@ IntrinsicsSolution solve_to_minimum(bool kalibr, LensModel model, WarpChoice war
   return solution;
 }
 
-TEST(EstimateIntrinsicsCovarianceByJackknife, IsInfiniteForSingleView) {
+TEST(JackknifeCovariance, IsInfiniteForSingleView) {
   IntrinsicsSolution solution = solve_to_minimum(false, LensModel::fisheye, WarpChoice::off, 4);
   ASSERT_TRUE(solution.has_succeeded());
   solution.views.resize(1);
   solution.problem.poses.resize(1);
-  solution.problem.points.resize(solution.problem.num_points_per_board());
-  const Eigen::MatrixXd found = estimate_intrinsics_covariance_by_jackknife(solution);
+  solution.problem.points.resize(solution.problem.points_per_board());
+  const Eigen::MatrixXd found = jackknife_covariance(solution);
   ASSERT_EQ(found.rows(), 8);
   EXPECT_TRUE((found.array() == std::numeric_limits<double>::infinity()).all());
 }
@@ -51,21 +51,21 @@ TEST(ComputeLeftOutMeanSquares, MatchesSolvesWithoutBlock) {
   ASSERT_TRUE(solution.has_succeeded());
   ASSERT_EQ(solution.views.size(), num_views);
   ASSERT_EQ(solution.outliers, 0);
-  const auto squares = compute_left_out_mean_squares_px2(solution, blocks);
+  const auto squares = compute_left_out_squares_px2(solution, blocks);
   ASSERT_EQ(squares.size(), num_views);
   double left_out = 0, in_sample = 0;
   for (const auto& [first, end] : {std::pair<std::size_t, std::size_t>{0, 3}, {3, 5}, {5, 7}}) {
     BoardProblem remaining = solution.problem;
     const auto begin = static_cast<std::ptrdiff_t>(first), last = static_cast<std::ptrdiff_t>(end);
-    const auto count = static_cast<std::ptrdiff_t>(solution.problem.num_points_per_board());
+    const auto count = static_cast<std::ptrdiff_t>(solution.problem.points_per_board());
     remaining.poses.erase(remaining.poses.begin() + begin, remaining.poses.begin() + last);
     remaining.points.erase(remaining.points.begin() + begin * count,
                            remaining.points.begin() + last * count);
     ASSERT_TRUE(solve_board_problem(remaining, solution.solved_parameters));
     const Lens lens(remaining.lens_model, remaining.intrinsics);
     for (std::size_t view = first; view < end; ++view) {
-      const auto pose = estimate_board_view_pose(input.views[view], lens);
-      const auto own = estimate_board_view_pose(input.views[view], solution.fitted_lens());
+      const auto pose = estimate_view_pose(input.views[view], lens);
+      const auto own = estimate_view_pose(input.views[view], solution.fitted_lens());
       ASSERT_TRUE(pose && own);
       EXPECT_NEAR(std::sqrt(squares[view]), pose->rms_px, 0.02 * pose->rms_px) << view;
       left_out += squares[view];
@@ -79,7 +79,7 @@ TEST(ComputeLeftOutMeanSquares, IsInfiniteWithoutRemainingViews) {
   const IntrinsicsSolution solution =
       solve_to_minimum(false, LensModel::fisheye, WarpChoice::off, 4);
   ASSERT_TRUE(solution.has_succeeded());
-  const auto squares = compute_left_out_mean_squares_px2(solution, 1);
+  const auto squares = compute_left_out_squares_px2(solution, 1);
   ASSERT_EQ(squares.size(), 4U);
   for (const double square : squares) EXPECT_EQ(square, std::numeric_limits<double>::infinity());
 }

@@ -59,7 +59,7 @@ inline BoardDetection wide_view(const SyntheticViews& views, Random& random, dou
 }
 
 inline bool has_enough_tags(const BoardDetection& seen, const BoardLattice& lattice) {
-  return seen.tags.size() > 5 && lattice.are_corners_sufficient_for_pose(seen);
+  return seen.tags.size() > 5 && lattice.can_determine_pose(seen);
 }
 
 inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double noise_px,
@@ -70,7 +70,7 @@ inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double
   while (static_cast<int>(input.views.size()) < count) {
     const BoardDetection seen = wide_view(views, random, noise_px, boards);
     if (has_enough_tags(seen, input.lattice))
-      input.views.push_back(input.lattice.list_corners_with_board_positions(seen));
+      input.views.push_back(input.lattice.list_corners(seen));
   }
   return input;
 }
@@ -78,7 +78,7 @@ inline IntrinsicsInput wide_input(bool kalibr, int count, Random& random, double
 /// Computes the difference from wide_lens() over the pixels up to `degrees` off the axis.
 inline ProjectionDifference up_to(double degrees, const Lens& found) {
   const auto difference =
-      compute_projection_difference(wide_lens(), found, kWideImager, [&](const auto& pixel) {
+      compare_projections(wide_lens(), found, kWideImager, [&](const auto& pixel) {
         const auto ray = wide_lens().unproject_pixel(pixel);
         const double cosine = ray ? ray->direction.normalized().z() : -1;
         return cosine > std::cos(degrees * std::numbers::pi / 180) ? 1.0 : INFINITY;

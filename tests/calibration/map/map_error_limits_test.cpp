@@ -63,24 +63,24 @@ TEST(DescribeMapErrors, DescribesEachKindDifferently) {
   for (const std::string& description : descriptions) length += description.size();
   EXPECT_EQ(describe_map_errors(found.errors).size(), length + 5 * 2) << "separated by semicolons";
   EXPECT_EQ(describe_map_errors({}), "");
-  EXPECT_THAT(describe_lamps_moved_since_calibration(3), testing::StartsWith("3 lamps"));
+  EXPECT_THAT(describe_moved_lamps(3), testing::StartsWith("3 lamps"));
 }
 
-TEST(IsLampMapUnusable, HoldsForSwappedOrMirroredLampsOnly) {
+TEST(IsMapUnusable, HoldsForSwappedOrMirroredLampsOnly) {
   MapErrors found;
-  EXPECT_FALSE(found.is_lamp_map_unusable());
+  EXPECT_FALSE(found.is_map_unusable());
   for (const auto& [kind, is_unusable] :
        {std::pair(MapErrorKind::moved, false), std::pair(MapErrorKind::inconsistent, false),
         std::pair(MapErrorKind::swapped, true), std::pair(MapErrorKind::mirrored, true),
         std::pair(MapErrorKind::other_room, false), std::pair(MapErrorKind::undetected, false)}) {
     found.errors = {{MapErrorKind::moved, {1}}, {kind, {2}}};
-    EXPECT_EQ(found.is_lamp_map_unusable(), is_unusable) << static_cast<int>(kind);
+    EXPECT_EQ(found.is_map_unusable(), is_unusable) << static_cast<int>(kind);
   }
 }
 
-TEST(FindUndetectedLamps, ListsLampsInNoFrameInOrderOfMap) {
+TEST(ListUndetectedLamps, ListsLampsInNoFrameInOrderOfMap) {
   const std::vector<Frame> frames{{"a", {{2, {0, 0}, {}}, {5, {0, 0}, {}}}}, {"b", {}}};
-  const auto found = find_undetected_lamps(frames, synthetic_lamps());
+  const auto found = list_undetected_lamps(frames, synthetic_lamps());
   std::vector<int> ids;
   for (const MapError& error : found) {
     EXPECT_EQ(error.kind, MapErrorKind::undetected);
@@ -126,9 +126,7 @@ class DetectLampErrorsAtLimits : public testing::Test {
       frames.push_back({std::to_string(k), seen_from(rig)});
     }
   }
-  MapErrors detect() const {
-    return detect_misplaced_or_swapped_lamps(frames, map, calibration, options);
-  }
+  MapErrors detect() const { return detect_map_errors(frames, map, calibration, options); }
   Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
   void set_survey_sd(double sd_m) {
     for (Lamp& lamp : map.lamps) lamp.sd_m = sd_m;
@@ -358,7 +356,7 @@ TEST_F(DetectLampErrorsAtLimits, SwappedLampsAreNotNamedIfAnotherPairFitsAsWell)
     const MapErrors found = detect();
     const bool is_swapped = !found.errors.empty() && found.errors[0].kind == MapErrorKind::swapped;
     EXPECT_EQ(is_swapped, !is_parallelogram) << describe_map_errors(found.errors);
-    EXPECT_EQ(found.is_lamp_map_unusable(), !is_parallelogram);
+    EXPECT_EQ(found.is_map_unusable(), !is_parallelogram);
   }
 }
 

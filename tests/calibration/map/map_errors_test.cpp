@@ -18,7 +18,7 @@ using testing::IsEmpty;
 using testing::SizeIs;
 
 /// Camera that is tilted by 3 degrees, which its calibration does not contain.
-class DetectMisplacedOrSwappedLamps : public testing::Test {
+class DetectMapErrors : public testing::Test {
  protected:
   Random random{41};
   SyntheticRig rig = make_tilted_rig(0.05, 1);
@@ -31,7 +31,7 @@ class DetectMisplacedOrSwappedLamps : public testing::Test {
     return camera;
   }
   std::vector<MapError> errors() const {
-    return detect_misplaced_or_swapped_lamps(frames, map, extract_camera()).errors;
+    return detect_map_errors(frames, map, extract_camera()).errors;
   }
   std::string found() const { return describe_map_errors(errors()); }
   std::vector<MapErrorKind> kinds() const {
@@ -59,15 +59,14 @@ class DetectMisplacedOrSwappedLamps : public testing::Test {
   Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
 };
 
-TEST_F(DetectMisplacedOrSwappedLamps, ReturnsNoErrorsForMapCorrectWithinFiveMillimeters) {
-  ASSERT_THAT(detect_misplaced_or_swapped_lamps(frames, map, extract_camera()).offsets,
-              SizeIs(map.lamps.size()));
+TEST_F(DetectMapErrors, ReturnsNoErrorsForMapCorrectWithinFiveMillimeters) {
+  ASSERT_THAT(detect_map_errors(frames, map, extract_camera()).offsets, SizeIs(map.lamps.size()));
   EXPECT_EQ(found(), "");
   for (Lamp& lamp : map.lamps) lamp.position_m.x() += random.uniform(-0.005, 0.005);
   EXPECT_EQ(found(), "") << "5 mm are for --refine-map";
 }
 
-TEST_F(DetectMisplacedOrSwappedLamps, ReturnsOffsetOfOneMovedLampForTiltedCamera) {
+TEST_F(DetectMapErrors, ReturnsOffsetOfOneMovedLampForTiltedCamera) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     map = rig.map;
     place(i).head<2>() += Eigen::Vector2d(-0.03, 0.004);
@@ -76,13 +75,13 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReturnsOffsetOfOneMovedLampForTiltedCamera
     EXPECT_EQ(one[0].kind, MapErrorKind::moved);
     EXPECT_EQ(one[0].lamps, std::vector<int>{map.lamps[i].id});
     EXPECT_LT((one[0].offset_m - Eigen::Vector3d(0.03, -0.004, 0)).norm(), 1e-3);
-    const MapErrors leveled = detect_misplaced_or_swapped_lamps(frames, map, rig.calibration);
+    const MapErrors leveled = detect_map_errors(frames, map, rig.calibration);
     EXPECT_EQ(describe_map_errors(leveled.errors), found()) << "with the tilt in the calibration";
     EXPECT_THAT(leveled.offsets, SizeIs(map.lamps.size()));
   }
 }
 
-TEST_F(DetectMisplacedOrSwappedLamps, ReturnsThreeDisplacedLampsOfEight) {
+TEST_F(DetectMapErrors, ReturnsThreeDisplacedLampsOfEight) {
   survey(1e-3);
   place(0).x() += 0.05;
   place(3).y() -= 0.07;
@@ -96,7 +95,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReturnsThreeDisplacedLampsOfEight) {
 
 /// With three lamps any of them may be displaced. With four, the other lamps determine the scatter
 /// of the map poorly.
-TEST_F(DetectMisplacedOrSwappedLamps, ReportsNoMovedLampOfThreeOrFourWithoutGivenSd) {
+TEST_F(DetectMapErrors, ReportsNoMovedLampOfThreeOrFourWithoutGivenSd) {
   use_lamps(3);
   place(0).x() += 0.05;
   EXPECT_THAT(errors(), IsEmpty());
@@ -113,7 +112,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReportsNoMovedLampOfThreeOrFourWithoutGive
 
 /// Its detections contradict the other lamps in all directions. They are rejected, but the lamp is
 /// still reported.
-TEST_F(DetectMisplacedOrSwappedLamps, ReportsOnlyTheLampOfWrongHeight) {
+TEST_F(DetectMapErrors, ReportsOnlyTheLampOfWrongHeight) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     map = rig.map;
     place(i).z() -= 0.1;
@@ -124,7 +123,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReportsOnlyTheLampOfWrongHeight) {
 }
 
 /// In a large room each capture contains few of the lamps.
-TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLargeRoom) {
+TEST_F(DetectMapErrors, DetectsMirroredMapOfLargeRoom) {
   constexpr int rows = 5;
   constexpr double distance_m = 1.2, height_m = 2.5, reach_m = 1.9;
   map.lamps.clear();
@@ -157,7 +156,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLargeRoom) {
   EXPECT_THAT(kinds(), ElementsAre(MapErrorKind::other_room));
 }
 
-TEST_F(DetectMisplacedOrSwappedLamps, ReportsErrorsForAtMostTenOf400CorrectMaps) {
+TEST_F(DetectMapErrors, ReportsErrorsForAtMostTenOf400CorrectMaps) {
   constexpr int maps = 400, max_alarms = 10;  // p = 0.01: 4 are expected
   for (const std::size_t lamps : {5U, 8U}) {
     rig = make_tilted_rig(0.05, 1);
@@ -169,7 +168,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReportsErrorsForAtMostTenOf400CorrectMaps)
         for (Lamp& lamp : map.lamps) {
           if (is_stated) lamp.sd_m = 2e-3;
         }
-        const MapErrors judged = detect_misplaced_or_swapped_lamps(frames, map, extract_camera());
+        const MapErrors judged = detect_map_errors(frames, map, extract_camera());
         // Without offsets and errors, the captures would be too few for an alarm.
         ASSERT_FALSE(judged.offsets.empty() && judged.errors.empty());
         alarms += judged.errors.empty() ? 0 : 1;
@@ -180,7 +179,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReportsErrorsForAtMostTenOf400CorrectMaps)
   }
 }
 
-TEST_F(DetectMisplacedOrSwappedLamps, OffsetSdsMatchErrorsOfReportedOffsets) {
+TEST_F(DetectMapErrors, OffsetSdsMatchErrorsOfReportedOffsets) {
   constexpr int maps = 200;
   double squares = 0;
   int count = 0;
@@ -200,12 +199,12 @@ TEST_F(DetectMisplacedOrSwappedLamps, OffsetSdsMatchErrorsOfReportedOffsets) {
   EXPECT_NEAR(std::sqrt(squares / count), 1, 0.15);
 }
 
-TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMap) {
+TEST_F(DetectMapErrors, DetectsMirroredMap) {
   for (Lamp& lamp : map.lamps) lamp.position_m.y() *= -1;
   EXPECT_THAT(kinds(), ElementsAre(MapErrorKind::mirrored));
 }
 
-TEST_F(DetectMisplacedOrSwappedLamps, NamesBothSwappedLampsOfEight) {
+TEST_F(DetectMapErrors, NamesBothSwappedLampsOfEight) {
   for (const auto& [first, second] : {std::pair(2, 4), std::pair(0, 7)}) {
     map = rig.map;
     std::swap(place(static_cast<std::size_t>(first)), place(static_cast<std::size_t>(second)));
@@ -215,7 +214,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, NamesBothSwappedLampsOfEight) {
   }
 }
 
-TEST_F(DetectMisplacedOrSwappedLamps, NamesBothSwappedLampsOfFour) {
+TEST_F(DetectMapErrors, NamesBothSwappedLampsOfFour) {
   use_lamps(4);
   rig.map.lamps[1].position_m.x() =
       0.5;  // a rectangle's mirror image is an exchange of its corners
@@ -226,7 +225,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, NamesBothSwappedLampsOfFour) {
 }
 
 /// No similarity takes a square to its mirror image.
-TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLampsInSquare) {
+TEST_F(DetectMapErrors, DetectsMirroredMapOfLampsInSquare) {
   for (std::size_t i = 0; i < 4; ++i) {
     Eigen::Vector3d& corner_m = rig.map.lamps[i].position_m;
     corner_m.x() = std::copysign(corner_m.y(), corner_m.x());
@@ -237,7 +236,7 @@ TEST_F(DetectMisplacedOrSwappedLamps, DetectsMirroredMapOfLampsInSquare) {
   EXPECT_THAT(kinds(), ElementsAre(MapErrorKind::mirrored));
 }
 
-TEST_F(DetectMisplacedOrSwappedLamps, ReportsLampWhoseDetectionsContradictOtherLamps) {
+TEST_F(DetectMapErrors, ReportsLampWhoseDetectionsContradictOtherLamps) {
   for (std::size_t i = 0; i < 6; ++i) {
     std::swap(frames[i].detections[0], frames[i].detections.back());
     frames[i].detections.back().pixel += Eigen::Vector2d(i % 2 == 0 ? 60 : -40, 30);
@@ -247,14 +246,14 @@ TEST_F(DetectMisplacedOrSwappedLamps, ReportsLampWhoseDetectionsContradictOtherL
   EXPECT_EQ(errors()[0].contradicting_captures, 6);
 }
 
-TEST_F(DetectMisplacedOrSwappedLamps, ReportsContradictedMapOnlyWhenLampIdsMatch) {
+TEST_F(DetectMapErrors, ReportsContradictedMapOnlyWhenLampIdsMatch) {
   for (Lamp& lamp : map.lamps) {
     lamp.position_m.head<2>() = Eigen::Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
   }
   EXPECT_THAT(kinds(), ElementsAre(MapErrorKind::other_room));
   for (Lamp& lamp : map.lamps) lamp.id += 100;
   EXPECT_EQ(found(), "");
-  EXPECT_THAT(find_undetected_lamps(frames, map), SizeIs(map.lamps.size()));
+  EXPECT_THAT(list_undetected_lamps(frames, map), SizeIs(map.lamps.size()));
   frames.clear();
   EXPECT_EQ(found(), "");
 }

@@ -52,9 +52,7 @@ class ChooseMapError : public testing::Test {
       frames.push_back({std::to_string(k), seen_from(room)});
     }
   }
-  MapErrors detect() const {
-    return detect_misplaced_or_swapped_lamps(frames, map, room.calibration, options);
-  }
+  MapErrors detect() const { return detect_map_errors(frames, map, room.calibration, options); }
   Eigen::Vector3d& place(std::size_t lamp) { return map.lamps[lamp].position_m; }
   void set_survey_sd(double sd_m) {
     for (Lamp& lamp : map.lamps) lamp.sd_m = sd_m;

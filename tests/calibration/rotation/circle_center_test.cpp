@@ -25,14 +25,13 @@ RotationScene pinhole_scene() {
 }
 
 RotationCaptures find_captures(const RotationScene& scene) {
-  RotationCaptures rotation =
-      find_in_place_rotation_captures(scene.frames(), scene.map, scene.camera);
+  RotationCaptures rotation = detect_pivots(scene.frames(), scene.map, scene.camera);
   EXPECT_EQ(rotation.status, RotationStatus::ok);
   return rotation;
 }
 
 CircleCenters find_centers(const RotationCaptures& rotation, const Camera& camera) {
-  return fit_and_average_lamp_circle_centers(rotation, camera, fit_rotation_axis(rotation, camera));
+  return fit_circle_centers(rotation, camera, fit_rotation_axis(rotation, camera));
 }
 
 /// Returns the image point zeta - e/H of the axis of a level camera.
@@ -42,7 +41,7 @@ Eigen::Vector2d center_of_level_camera(const RotationScene& scene) {
   return {f[2] + f[0] * z.x(), f[3] + f[1] * z.y()};
 }
 
-TEST(FitAndAverageLampCircleCenters, ReturnsAxisPixelWhenCameraIsLevel) {
+TEST(FitCircleCenters, ReturnsAxisPixelWhenCameraIsLevel) {
   RotationScene scene;
   scene.lever_arm_m = {0.05, -0.02};
   const CircleCenters found = find_centers(find_captures(scene), scene.camera);
@@ -57,7 +56,7 @@ TEST(FitAndAverageLampCircleCenters, ReturnsAxisPixelWhenCameraIsLevel) {
 /// The rays to a lamp form a cone about the axis. A tilted camera maps it to an ellipse with its
 /// center at f sin t cos t / (cos^2 t - sin^2 phi) from the principal point. A circle through many
 /// equally spaced points of the ellipse has the same center, up to second order in t.
-TEST(FitAndAverageLampCircleCenters, CircleCentersMatchEllipseFormulaForTiltedCamera) {
+TEST(FitCircleCenters, CircleCentersMatchEllipseFormulaForTiltedCamera) {
   for (const double tilt_deg : {0.5, 1.0, 2.0}) {
     SCOPED_TRACE(tilt_deg);
     RotationScene scene = pinhole_scene();
@@ -106,13 +105,13 @@ RotationCaptures captures_at(const std::vector<double>& yaws_rad, bool noise_is_
       if (!noise_is_stated) detection.sigma_px.reset();
     }
   }
-  RotationCaptures rotation = find_in_place_rotation_captures(frames, scene.map, scene.camera);
+  RotationCaptures rotation = detect_pivots(frames, scene.map, scene.camera);
   EXPECT_EQ(rotation.status, RotationStatus::ok);
   return rotation;
 }
 
 /// With captures at two opposite yaws, only noise makes a triangle of the positions of a lamp.
-TEST(FitAndAverageLampCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
+TEST(FitCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
   constexpr int draws = 8;
   Random random(31);
   for (const int count : {3, 6, 12, 40}) {
@@ -131,7 +130,7 @@ TEST(FitAndAverageLampCircleCenters, DoesNotConvergeAtTwoOppositeYaws) {
   }
 }
 
-TEST(FitAndAverageLampCircleCenters, ConvergesWhenThirdYawJoinsOppositeYaws) {
+TEST(FitCircleCenters, ConvergesWhenThirdYawJoinsOppositeYaws) {
   constexpr int draws = 8;
   Random random(32);
   for (int i = 0; i < draws; ++i) {

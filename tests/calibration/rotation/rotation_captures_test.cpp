@@ -21,10 +21,9 @@ void expect_axis(const RotationFit& found, const RotationScene& scene, double wi
       within_deg);
 }
 
-TEST(FindInPlaceRotationCaptures, ReturnsTrueHeightsYawsAxesAndLeverArm) {
+TEST(DetectPivots, ReturnsTrueHeightsYawsAxesAndLeverArm) {
   const RotationScene scene = tilted_scene({0.012, -0.009}, {0, 0.3});
-  const RotationCaptures rotation =
-      find_in_place_rotation_captures(scene.frames(), scene.map, scene.camera);
+  const RotationCaptures rotation = detect_pivots(scene.frames(), scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
   ASSERT_EQ(rotation.captures.size(), 24U);
   ASSERT_EQ(rotation.heights.size(), 2U);
@@ -60,8 +59,7 @@ TEST(FitRotationAxis, RejectsDisplacedDetectionsInThirdOfCaptures) {
     one.pixel += Eigen::Vector2d(random.uniform(2, 60), random.uniform(-60, -2));
     wrong.emplace_back(frames[i].image, one.lamp);
   }
-  const RotationCaptures rotation =
-      find_in_place_rotation_captures(frames, scene.map, scene.camera);
+  const RotationCaptures rotation = detect_pivots(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
   EXPECT_TRUE(rotation.rejected_captures.empty());
   const RotationFit found = fit_rotation_axis(rotation, scene.camera);
@@ -76,15 +74,14 @@ TEST(FitRotationAxis, RejectsDisplacedDetectionsInThirdOfCaptures) {
   EXPECT_LE(named.size(), wrong.size() + 1);
 }
 
-TEST(FindInPlaceRotationCaptures, RejectsCaptureWithMisidentifiedLamp) {
+TEST(DetectPivots, RejectsCaptureWithMisidentifiedLamp) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(1.5);
   scene.map = make_lamp_map({{-0.3, -0.35, 1.6}, {0.5, 0.2, 1.6}, {0.1, 0.4, 1.6}});
   auto frames = scene.frames();
   for (Frame& frame : frames) frame.detections.resize(2);
   frames[4].detections[1].lamp = 3;
-  const RotationCaptures rotation =
-      find_in_place_rotation_captures(frames, scene.map, scene.camera);
+  const RotationCaptures rotation = detect_pivots(frames, scene.map, scene.camera);
   ASSERT_EQ(rotation.status, RotationStatus::ok);
   ASSERT_EQ(rotation.rejected_captures.size(), 1U);
   EXPECT_EQ(rotation.rejected_captures[0].image, "4.png");

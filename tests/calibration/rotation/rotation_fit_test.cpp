@@ -35,8 +35,7 @@ TEST(FitRotationAxis, FailsForCapturesAboutTwoAxes) {
   auto frames = scene.frames(0.1);
   const auto others = elsewhere.frames(0.1);
   for (std::size_t i = 0; i < frames.size(); i += 2) frames[i].detections = others[i].detections;
-  const RotationCaptures rotation =
-      find_in_place_rotation_captures(frames, scene.map, scene.camera);
+  const RotationCaptures rotation = detect_pivots(frames, scene.map, scene.camera);
   EXPECT_TRUE(rotation.status != RotationStatus::ok ||
               !fit_rotation_axis(rotation, scene.camera).converged);
 }

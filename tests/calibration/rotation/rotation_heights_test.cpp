@@ -24,12 +24,12 @@ RotationScene high_scene() {
 }
 
 RotationCaptures find_captures(const RotationScene& scene, const std::vector<Frame>& frames) {
-  RotationCaptures rotation = find_in_place_rotation_captures(frames, scene.map, scene.camera);
-  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe_rotation_status(rotation.status);
+  RotationCaptures rotation = detect_pivots(frames, scene.map, scene.camera);
+  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe_status(rotation.status);
   return rotation;
 }
 
-TEST(FindInPlaceRotationCaptures, SeparatesHeightsTenCentimetersApart) {
+TEST(DetectPivots, SeparatesHeightsTenCentimetersApart) {
   RotationScene scene = high_scene();
   scene.heights_m = {0, 0.1};
   for (int seed = 0; seed < kSeeds; ++seed) {
@@ -49,7 +49,7 @@ TEST(FindInPlaceRotationCaptures, SeparatesHeightsTenCentimetersApart) {
 }
 
 /// Noise of 1 px causes height errors of 1 % of the distance for fixes of two lamps.
-TEST(FindInPlaceRotationCaptures, ReturnsOneHeightUnderNoiseOfOnePixel) {
+TEST(DetectPivots, ReturnsOneHeightUnderNoiseOfOnePixel) {
   for (const std::size_t lamps : {std::size_t{2}, std::size_t{8}}) {
     RotationScene scene = tilted_scene();
     scene.map.lamps.resize(lamps);

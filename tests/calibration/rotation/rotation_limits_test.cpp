@@ -34,8 +34,8 @@ RotationScene make_small_scene(const Eigen::Vector2d& lever_arm_m,
 }
 
 RotationCaptures find_rotation(const RotationScene& scene, const std::vector<Frame>& frames) {
-  RotationCaptures rotation = find_in_place_rotation_captures(frames, scene.map, scene.camera);
-  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe_rotation_status(rotation.status);
+  RotationCaptures rotation = detect_pivots(frames, scene.map, scene.camera);
+  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe_status(rotation.status);
   return rotation;
 }
 
@@ -123,26 +123,25 @@ TEST(FitRotationAxis, OmitsLeverArmWithTooLargeStandardDeviation) {
   }
 }
 
-TEST(ComputeTiltFromRotationCenter, ReturnsAngleAndAzimuthOfZenith) {
+TEST(ComputeTilt, ReturnsAngleAndAzimuthOfZenith) {
   RotationCenter center{};
   center.zenith_in_camera = Eigen::Vector3d(0.03, 0.04, 0.05).normalized();
-  EXPECT_NEAR(compute_tilt_from_rotation_center(center).angle_rad, M_PI / 4, 1e-12);
-  EXPECT_NEAR(compute_tilt_from_rotation_center(center).azimuth_rad, std::atan(4. / 3), 1e-12);
+  EXPECT_NEAR(compute_tilt(center).angle_rad, M_PI / 4, 1e-12);
+  EXPECT_NEAR(compute_tilt(center).azimuth_rad, std::atan(4. / 3), 1e-12);
   center.zenith_in_camera = Eigen::Vector3d(-0.2, 0, 0.98).normalized();
-  EXPECT_NEAR(compute_tilt_from_rotation_center(center).azimuth_rad, M_PI, 1e-12);
-  EXPECT_NEAR(compute_tilt_from_rotation_center(center).angle_rad, std::atan(0.2 / 0.98), 1e-12);
+  EXPECT_NEAR(compute_tilt(center).azimuth_rad, M_PI, 1e-12);
+  EXPECT_NEAR(compute_tilt(center).angle_rad, std::atan(0.2 / 0.98), 1e-12);
 }
 
-TEST(MakeRotationCenterFromAxisPoint, ScalesPointByFocalLengths) {
+TEST(MakeRotationCenter, ScalesPointByFocalLengths) {
   const Camera camera = make_camera_with_unequal_focal_lengths();
-  const RotationCenter center =
-      make_rotation_center_from_axis_point({0.3, -0.4}, RotationModel::shift, camera);
+  const RotationCenter center = make_rotation_center({0.3, -0.4}, RotationModel::shift, camera);
   EXPECT_EQ(center.model, RotationModel::shift);
   EXPECT_THAT(center.center_px, IsNear(Eigen::Vector2d(403 + 162, 296 - 200), 1e-9));
   EXPECT_THAT(center.zenith_in_camera,
               IsNear(Eigen::Vector3d(0.3, -0.4, 1) / std::sqrt(1.25), 1e-12));
   EXPECT_FALSE(center.lever_arm_m);
-  EXPECT_THAT(undistorted_pixel_from_normalized_point(camera, {-0.1, 0.2}),
+  EXPECT_THAT(ideal_pixel_from_point(camera, {-0.1, 0.2}),
               IsNear(Eigen::Vector2d(403 - 54, 296 + 100), 1e-9));
 }
 

@@ -19,8 +19,7 @@ namespace {
 using Method = RotationFit (*)(const RotationCaptures&, const Camera&);
 
 RotationFit mean_circle(const RotationCaptures& rotation, const Camera& camera) {
-  return fit_and_average_lamp_circle_centers(rotation, camera, fit_rotation_axis(rotation, camera))
-      .mean;
+  return fit_circle_centers(rotation, camera, fit_rotation_axis(rotation, camera)).mean;
 }
 
 struct RotationCase {
@@ -40,8 +39,7 @@ TEST_P(RotationFitScatter, ErrorsMatchReportedCovarianceAndInliersAreKept) {
   constexpr int draws = 200;
   const auto& [name, scene, map_sd_m, noise_is_stated, noise_px, method] = GetParam();
   const auto frames = scene.frames(noise_px);
-  const RotationFit truth =
-      method(find_in_place_rotation_captures(frames, scene.map, scene.camera), scene.camera);
+  const RotationFit truth = method(detect_pivots(frames, scene.map, scene.camera), scene.camera);
   ASSERT_TRUE(truth.converged);
   Random random(14);
   EstimateScatter scatter;
@@ -59,8 +57,7 @@ TEST_P(RotationFitScatter, ErrorsMatchReportedCovarianceAndInliersAreKept) {
         if (!noise_is_stated) detection.sigma_px.reset();
       }
     }
-    const RotationCaptures rotation =
-        find_in_place_rotation_captures(noisy, surveyed, scene.camera);
+    const RotationCaptures rotation = detect_pivots(noisy, surveyed, scene.camera);
     ASSERT_EQ(rotation.status, RotationStatus::ok);
     const RotationFit fit = method(rotation, scene.camera);
     ASSERT_TRUE(fit.converged && fit.covariance);
@@ -158,7 +155,7 @@ TEST(RotationFit, EachMethodRejectsOnlyTheOutlierAmongFewCaptures) {
     int found = 0, others = 0;
     for (int i = 0; i < runs; ++i) {
       const RotationCaptures rotation =
-          find_in_place_rotation_captures(with_noise(frames, random), scene.map, scene.camera);
+          detect_pivots(with_noise(frames, random), scene.map, scene.camera);
       ASSERT_EQ(rotation.status, RotationStatus::ok);
       for (const RotationOutlier& outlier : method(rotation, scene.camera).outliers) {
         const RotationObservation& at = rotation.observations[outlier.observation];

@@ -40,9 +40,7 @@ class RotationFrames {
   void add_turn(int count, double height_m, double arc_rad = 2 * std::numbers::pi) {
     for (int i = 0; i < count; ++i) add(0.3 + arc_rad * i / count, height_m);
   }
-  RotationCaptures find() const {
-    return find_in_place_rotation_captures(frames, scene_.map, scene_.camera);
-  }
+  RotationCaptures find() const { return detect_pivots(frames, scene_.map, scene_.camera); }
 
   std::vector<Frame> frames;
 
@@ -62,7 +60,7 @@ std::vector<std::string> list_rejected_images(const RotationCaptures& rotation) 
   return images;
 }
 
-TEST(FindInPlaceRotationCaptures, RequiresThreeCapturesWithDetections) {
+TEST(DetectPivots, RequiresThreeCapturesWithDetections) {
   RotationFrames frames((RotationScene()));
   EXPECT_EQ(frames.find().status, RotationStatus::other_map) << "no capture";
   frames.add(0);
@@ -76,7 +74,7 @@ TEST(FindInPlaceRotationCaptures, RequiresThreeCapturesWithDetections) {
 }
 
 /// Two captures with a fix, and others without one.
-TEST(FindInPlaceRotationCaptures, StatusFollowsReasonsForWhichFixesFail) {
+TEST(DetectPivots, StatusFollowsReasonsForWhichFixesFail) {
   RotationScene mirrored;
   for (Lamp& lamp : mirrored.map.lamps) lamp.position_m.x() *= -1;
   const auto one_lamp = [](Frame& frame) { frame.detections.resize(1); };
@@ -107,7 +105,7 @@ TEST(FindInPlaceRotationCaptures, StatusFollowsReasonsForWhichFixesFail) {
   }
 }
 
-TEST(FindInPlaceRotationCaptures, RequiresArcOf90Degrees) {
+TEST(DetectPivots, RequiresArcOf90Degrees) {
   for (const double arc_deg : {88., 92.}) {
     RotationFrames frames((RotationScene()));
     for (int i = 0; i < 5; ++i) frames.add(0.3 + rad_from_deg(arc_deg) * i / 4);
@@ -115,7 +113,7 @@ TEST(FindInPlaceRotationCaptures, RequiresArcOf90Degrees) {
   }
 }
 
-TEST(FindInPlaceRotationCaptures, ReturnsSingleYawStatusForArcBelowTwentiethRadian) {
+TEST(DetectPivots, ReturnsSingleYawStatusForArcBelowTwentiethRadian) {
   const auto find_status = [](const std::vector<double>& arcs_rad) {
     RotationFrames frames((RotationScene()));
     for (std::size_t height = 0; height < arcs_rad.size(); ++height) {
@@ -133,7 +131,7 @@ TEST(FindInPlaceRotationCaptures, ReturnsSingleYawStatusForArcBelowTwentiethRadi
   EXPECT_EQ(find_status({0.048, 0.02}), RotationStatus::single_yaw);
 }
 
-TEST(FindInPlaceRotationCaptures, SeparatesHeightsThatDifferByMoreThanOnePercentOfDistance) {
+TEST(DetectPivots, SeparatesHeightsThatDifferByMoreThanOnePercentOfDistance) {
   const auto count_heights = [](const std::vector<double>& heights_m) {
     RotationFrames frames((RotationScene()));
     for (const double height_m : heights_m) frames.add_turn(4, height_m);
@@ -153,7 +151,7 @@ TEST(FindInPlaceRotationCaptures, SeparatesHeightsThatDifferByMoreThanOnePercent
 
 /// Captures of four heights in mixed order. The lowest has too few captures, the third too small an
 /// arc.
-TEST(FindInPlaceRotationCaptures, NumbersHeightsFromLowestAndRejectsOthers) {
+TEST(DetectPivots, NumbersHeightsFromLowestAndRejectsOthers) {
   RotationScene scene = tilted_scene({0.02, -0.03});
   for (std::size_t i = 0; i < scene.map.lamps.size(); ++i) {
     scene.map.lamps[i].position_m.z() += 0.02 * static_cast<double>(i);
@@ -196,7 +194,7 @@ TEST(FindInPlaceRotationCaptures, NumbersHeightsFromLowestAndRejectsOthers) {
 
 /// Each yaw occurs twice, with the axis displaced to either side. All distances from the mean axis
 /// are then equal. The limit of their median is 5 % of the height of the lamps.
-TEST(FindInPlaceRotationCaptures, ReturnsAxisMovedStatusForMedianDistanceAboveFivePercent) {
+TEST(DetectPivots, ReturnsAxisMovedStatusForMedianDistanceAboveFivePercent) {
   for (const double distance_m : {0.077, 0.083}) {
     RotationFrames frames((RotationScene()));
     for (int i = 0; i < 6; ++i) {
@@ -210,7 +208,7 @@ TEST(FindInPlaceRotationCaptures, ReturnsAxisMovedStatusForMedianDistanceAboveFi
 }
 
 /// The limit is 1 % of the height of the lamps for captures that agree exactly.
-TEST(FindInPlaceRotationCaptures, RejectsCaptureFarFromAxisOfOthers) {
+TEST(DetectPivots, RejectsCaptureFarFromAxisOfOthers) {
   for (const double distance_m : {0.0155, 0.0165}) {
     RotationFrames frames((RotationScene()));
     for (int i = 0; i < 8; ++i) {
@@ -236,7 +234,7 @@ TEST(FindInPlaceRotationCaptures, RejectsCaptureFarFromAxisOfOthers) {
 }
 
 /// Before the tilt is estimated, the lamps have residuals of about 10 % of their distances.
-TEST(FindInPlaceRotationCaptures, FindsRotationOfCameraTiltedBy27Degrees) {
+TEST(DetectPivots, FindsRotationOfCameraTiltedBy27Degrees) {
   RotationScene scene;
   scene.tilt_rad = rad_from_deg(27);
   scene.camera = fisheye_camera();
@@ -248,7 +246,7 @@ TEST(FindInPlaceRotationCaptures, FindsRotationOfCameraTiltedBy27Degrees) {
   EXPECT_THAT(rotation.zenith_in_camera, IsNear(scene.truth().zenith_in_camera, 1e-8));
 }
 
-TEST(FindInPlaceRotationCaptures, ObservationsHaveRayOfEachKnownLamp) {
+TEST(DetectPivots, ObservationsHaveRayOfEachKnownLamp) {
   RotationScene scene = tilted_scene({0, 0});
   RotationFrames frames(scene);
   frames.add_turn(5, 0);
@@ -287,7 +285,7 @@ TEST(DescribeRotationStatus, DescribesEachStatusDifferently) {
        {RotationStatus::ok, RotationStatus::other_map, RotationStatus::too_few_lamps,
         RotationStatus::too_few_captures, RotationStatus::single_yaw, RotationStatus::short_arc,
         RotationStatus::axis_moved}) {
-    EXPECT_TRUE(descriptions.emplace(describe_rotation_status(status)).second);
+    EXPECT_TRUE(descriptions.emplace(describe_status(status)).second);
   }
 }
 

@@ -47,9 +47,8 @@ RotationScene tilted_scene(const Eigen::Vector2d& lever_arm_m,
 }
 
 RotationFit fit_axis(const RotationScene& scene, const std::vector<Frame>& frames) {
-  const RotationCaptures rotation =
-      find_in_place_rotation_captures(frames, scene.map, scene.camera);
-  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe_rotation_status(rotation.status);
+  const RotationCaptures rotation = detect_pivots(frames, scene.map, scene.camera);
+  EXPECT_EQ(rotation.status, RotationStatus::ok) << describe_status(rotation.status);
   return rotation.status == RotationStatus::ok ? fit_rotation_axis(rotation, scene.camera)
                                                : RotationFit();
 }

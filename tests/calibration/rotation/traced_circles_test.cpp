@@ -75,11 +75,11 @@ CircleCenters find_centers(const TracedCaptures& traced, double residual_px = 0)
   axis.residual_px = residual_px;
   for (std::size_t i = 0; i < traced.rotation.observations.size(); ++i)
     axis.used_observations.push_back(i);
-  return fit_and_average_lamp_circle_centers(traced.rotation, make_traced_camera(), axis);
+  return fit_circle_centers(traced.rotation, make_traced_camera(), axis);
 }
 
 /// Two circles with unequal numbers of points, and a lamp with two points only.
-TEST(FitAndAverageLampCircleCenters, ReturnsMeanSpreadResidualAndCovarianceOfCircles) {
+TEST(FitCircleCenters, ReturnsMeanSpreadResidualAndCovarianceOfCircles) {
   TracedCaptures traced(3);
   const auto angles = make_equal_angles(6);
   for (const double angle : angles) traced.add_capture(angle + 0.5);
@@ -119,7 +119,7 @@ TEST(FitAndAverageLampCircleCenters, ReturnsMeanSpreadResidualAndCovarianceOfCir
 }
 
 /// Circles through three points have no residuals, and no covariance.
-TEST(FitAndAverageLampCircleCenters, HasNoCovarianceForThreeCaptures) {
+TEST(FitCircleCenters, HasNoCovarianceForThreeCaptures) {
   TracedCaptures traced(2);
   const auto angles = make_equal_angles(3);
   for (const double angle : angles) traced.add_capture(angle);
@@ -147,7 +147,7 @@ bool is_determined(const std::vector<double>& angles, double sigma, double axis_
 
 /// Four points at angles of +-a about two opposite directions. Across them, the information is
 /// 4 sin^2 a and the contribution of the noise s^2 / R^2 4 cos^2 a.
-TEST(FitAndAverageLampCircleCenters, CenterIsDeterminedUpToQuarterNoiseAcrossOppositeYaws) {
+TEST(FitCircleCenters, CenterIsDeterminedUpToQuarterNoiseAcrossOppositeYaws) {
   for (const double direction : {0.0, 0.8}) {
     for (const double a : {0.2, 0.5}) {
       std::vector<double> angles;
@@ -164,7 +164,7 @@ TEST(FitAndAverageLampCircleCenters, CenterIsDeterminedUpToQuarterNoiseAcrossOpp
 }
 
 /// Points on a straight line determine no circle.
-TEST(FitAndAverageLampCircleCenters, UsesHeightOnlyIfMostOfItsCirclesAreDetermined) {
+TEST(FitCircleCenters, UsesHeightOnlyIfMostOfItsCirclesAreDetermined) {
   const auto angles = make_equal_angles(5);
   const auto make = [&](int circles, int lines) {
     TracedCaptures traced(circles + lines, 2);
@@ -197,7 +197,7 @@ TEST(FitAndAverageLampCircleCenters, UsesHeightOnlyIfMostOfItsCirclesAreDetermin
   EXPECT_EQ(few.undetermined, 3);
 }
 
-TEST(FitAndAverageLampCircleCenters, UsesInliersOfConvergedAxisOnly) {
+TEST(FitCircleCenters, UsesInliersOfConvergedAxisOnly) {
   const auto angles = make_equal_angles(6);
   TracedCaptures traced(1);
   for (const double angle : angles) traced.add_capture(angle);
@@ -206,15 +206,13 @@ TEST(FitAndAverageLampCircleCenters, UsesInliersOfConvergedAxisOnly) {
   axis.converged = true;
   axis.outliers = {{2, 50}};
   axis.used_observations = {0, 1, 3, 4, 5};
-  const CircleCenters found =
-      fit_and_average_lamp_circle_centers(traced.rotation, make_traced_camera(), axis);
+  const CircleCenters found = fit_circle_centers(traced.rotation, make_traced_camera(), axis);
   ASSERT_TRUE(found.mean.converged);
   EXPECT_EQ(found.mean.used_observations, axis.used_observations);
   ASSERT_EQ(found.mean.outliers.size(), 1U);
   EXPECT_THAT(found.mean.center.center_px, IsNear(Eigen::Vector2d(413, 292), 1e-6));
   axis.converged = false;
-  EXPECT_FALSE(fit_and_average_lamp_circle_centers(traced.rotation, make_traced_camera(), axis)
-                   .mean.converged);
+  EXPECT_FALSE(fit_circle_centers(traced.rotation, make_traced_camera(), axis).mean.converged);
 }
 
 }  // namespace

@@ -16,10 +16,10 @@ TiltCalibration level(const MovingCaptures& captures, const std::vector<KnownMot
   TiltCalibrationOptions options;
   options.motions = motions;
   options.refine_map = refine_map;
-  return estimate_camera_tilt_from_lamps(captures.frames, rig.map, rig.calibration.camera, options);
+  return estimate_tilt_from_lamps(captures.frames, rig.map, rig.calibration.camera, options);
 }
 
-TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
+TEST(EstimateTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
   Random random(1);
   const BodyRig rig = make_tilted_body();
   const MovingCaptures captures = make_moving_captures(rig, 12, 2, random, 1e-3);
@@ -40,7 +40,7 @@ TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
 }
 
 /// A skipped capture does not shift the motions of the captures after it.
-TEST(EstimateCameraTiltFromLamps, AppliesMotionOfEachCaptureWhenAnotherHasFewLamps) {
+TEST(EstimateTiltFromLamps, AppliesMotionOfEachCaptureWhenAnotherHasFewLamps) {
   Random random(4);
   const BodyRig rig = make_tilted_body();
   MovingCaptures captures = make_moving_captures(rig, 12, 2, random, 1e-3);
@@ -53,7 +53,7 @@ TEST(EstimateCameraTiltFromLamps, AppliesMotionOfEachCaptureWhenAnotherHasFewLam
               IsNear(rig.calibration.rotation_center->zenith_in_camera, 1e-8));
 }
 
-TEST(EstimateCameraTiltFromLamps, TiltErrorIsTenTimesLargerWhenMotionIsIgnored) {
+TEST(EstimateTiltFromLamps, TiltErrorIsTenTimesLargerWhenMotionIsIgnored) {
   Random random(2);
   const BodyRig rig = make_tilted_body();
   MovingCaptures captures = make_moving_captures(rig, 24, 1, random, 0.03);

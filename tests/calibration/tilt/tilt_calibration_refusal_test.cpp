@@ -25,8 +25,7 @@ class EstimateTiltFromLampsFailure : public testing::Test {
               bool refine_map = false) {
     options.refine_map = refine_map;
     const std::string found =
-        estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options)
-            .undetermined;
+        estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options).undetermined;
     EXPECT_EQ(found.empty(), reason.empty()) << found;
     EXPECT_THAT(found, testing::HasSubstr(reason));
   }
@@ -91,8 +90,7 @@ TEST_F(EstimateTiltFromLampsFailure, RefinedMapNeedsRedundancy) {
 TEST_F(EstimateTiltFromLampsFailure, LargestStandardDeviationsAreLimited) {
   auto frames = noisy_drive(12, 0.5);
   const auto limited = [&](double factor) {
-    const TiltCalibration found =
-        estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+    const TiltCalibration found = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
     EXPECT_EQ(found.covariance.rows(), 2);
     options.max_sd_rad = factor * std::sqrt(found.covariance.diagonal().maxCoeff());
   };
@@ -108,7 +106,7 @@ TEST_F(EstimateTiltFromLampsFailure, LargestStandardDeviationsAreLimited) {
   options.max_lamp_sd_m = 1;
   options.refine_map = true;
   const auto corrections =
-      estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options).corrections;
+      estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options).corrections;
   ASSERT_EQ(corrections.size(), 8U);
   for (const double factor : {1.001, 0.999}) {
     options.max_lamp_sd_m = factor * corrections[2].sd_m.maxCoeff();

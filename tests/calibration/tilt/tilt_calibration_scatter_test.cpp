@@ -57,8 +57,7 @@ TEST_P(EstimateTiltScatter, ZenithErrorsMatchReportedCovariance) {
       if (drive.map_sd_m > 0) lamp.sd_m = drive.map_sd_m;
       for (double& coordinate : lamp.position_m) coordinate += drive.map_sd_m * random.normal();
     }
-    const auto result =
-        estimate_camera_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
+    const auto result = estimate_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
     ASSERT_EQ(result.undetermined, "");
     ASSERT_EQ(result.covariance.rows(), 2);
     zenith.add(result.center.zenith_in_camera.hnormalized() -

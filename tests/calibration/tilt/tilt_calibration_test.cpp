@@ -50,7 +50,7 @@ double compute_shape_error_m(const LampMap& found, const LampMap& truth) {
   return worst_m;
 }
 
-TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltWithoutNoise) {
+TEST(EstimateTiltFromLamps, ReturnsExactTiltWithoutNoise) {
   Random random(1);
   for (const double tilt_deg : {0.0, 0.5, 3.0, 6.0, 10.0}) {
     for (const bool stated : {true, false}) {
@@ -61,7 +61,7 @@ TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltWithoutNoise) {
           if (!stated) detection.sigma_px.reset();
         }
       }
-      const auto result = estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+      const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
       ASSERT_EQ(result.undetermined, "") << tilt_deg;
       const auto& truth = *rig.calibration.rotation_center;
       EXPECT_LT(angle_between(result.center.zenith_in_camera, truth.zenith_in_camera), 1e-10);
@@ -79,26 +79,26 @@ TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltWithoutNoise) {
   }
 }
 
-TEST(EstimateCameraTiltFromLamps, ResidualsOfLevelCameraEqualNoiseBeforeAndAfter) {
+TEST(EstimateTiltFromLamps, ResidualsOfLevelCameraEqualNoiseBeforeAndAfter) {
   Random random(7);
   auto rig = make_tilted_rig(0, 0);
   rig.calibration.camera.lens_model = LensModel::pinhole;
   rig.calibration.camera.intrinsics.resize(4);
   auto frames = drive(rig, 40, random, 0.2);
   for (Frame& frame : frames) frame.detections = with_noise(frame.detections, random);
-  const auto result = estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_NEAR(result.residual_before_px, 0.2, 0.03);
   EXPECT_NEAR(result.residual_px, 0.2, 0.03);
 }
 
-TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
+TEST(EstimateTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
   Random random(2);
   const auto rig = make_tilted_rig(0.05, 1);
   auto frames = drive(rig, 10, random);
   for (Frame& frame : frames) frame.detections.resize(3);
   frames[4].detections.resize(2);
-  const auto result = estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_LT(angle_between(result.center.zenith_in_camera,
                           rig.calibration.rotation_center->zenith_in_camera),
@@ -107,7 +107,7 @@ TEST(EstimateCameraTiltFromLamps, ReturnsExactTiltFromThreeLampsPerCapture) {
   EXPECT_EQ(result.captures, 9);
 }
 
-TEST(EstimateCameraTiltFromLamps, RecoversExactTiltAndMapShapeWhenRefiningMap) {
+TEST(EstimateTiltFromLamps, RecoversExactTiltAndMapShapeWhenRefiningMap) {
   Random random(3);
   auto rig = make_tilted_rig(0.05, 2);
   const LampMap surveyed = rig.map;
@@ -115,8 +115,7 @@ TEST(EstimateCameraTiltFromLamps, RecoversExactTiltAndMapShapeWhenRefiningMap) {
   const auto frames = drive(rig, 12, random);
   TiltCalibrationOptions options;
   options.refine_map = true;
-  const auto result =
-      estimate_camera_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
+  const auto result = estimate_tilt_from_lamps(frames, surveyed, rig.calibration.camera, options);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_LT(angle_between(result.center.zenith_in_camera,
                           rig.calibration.rotation_center->zenith_in_camera),
@@ -142,7 +141,7 @@ TEST(EstimateCameraTiltFromLamps, RecoversExactTiltAndMapShapeWhenRefiningMap) {
   EXPECT_LT(std::abs(scaled), 1e-12);
 }
 
-TEST(EstimateCameraTiltFromLamps, KeepsPositionOfUndetectedLampWhenRefiningMap) {
+TEST(EstimateTiltFromLamps, KeepsPositionOfUndetectedLampWhenRefiningMap) {
   Random random(4);
   const auto rig = make_tilted_rig(0.03, 2);
   auto frames = drive(rig, 12, random);
@@ -151,15 +150,14 @@ TEST(EstimateCameraTiltFromLamps, KeepsPositionOfUndetectedLampWhenRefiningMap) 
   }
   TiltCalibrationOptions options;
   options.refine_map = true;
-  const auto result =
-      estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options);
+  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_EQ(result.corrections.size(), 7);
   ASSERT_EQ(result.map.lamps.size(), 8);
   EXPECT_EQ(result.map.lamps[2].position_m, rig.map.lamps[2].position_m);
 }
 
-TEST(EstimateCameraTiltFromLamps, RejectsSwappedAndDisplacedDetections) {
+TEST(EstimateTiltFromLamps, RejectsSwappedAndDisplacedDetections) {
   Random random(5);
   const auto rig = make_tilted_rig(0.08, -1);
   auto frames = with_noise(drive(rig, 40, random, 0.05), random);
@@ -171,7 +169,7 @@ TEST(EstimateCameraTiltFromLamps, RejectsSwappedAndDisplacedDetections) {
       detections[2].pixel += Eigen::Vector2d(random.uniform(2, 10), random.uniform(2, 10));
     }
   }
-  const auto result = estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
+  const auto result = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);
   ASSERT_EQ(result.undetermined, "");
   EXPECT_GE(result.detections_rejected, 15);
   EXPECT_LE(result.detections_rejected, 20);

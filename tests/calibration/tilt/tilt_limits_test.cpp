@@ -27,13 +27,13 @@ TiltCalibration estimate_tilt(const SyntheticRig& rig, const std::vector<Frame>&
                               bool refine_map = false) {
   TiltCalibrationOptions options;
   options.refine_map = refine_map;
-  return estimate_camera_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options);
+  return estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera, options);
 }
 
 /// Captures with too few lamps (1), an unknown lamp (3), few lamps (4), an outlier (6), and a lamp
 /// that is detected twice (7). Captures 1 and 7 are not used.
 /// The residual before the calibration is that of the position fixes of a level camera.
-TEST(EstimateCameraTiltFromLamps, ReportsCountsAndResidualsOfLevelFixes) {
+TEST(EstimateTiltFromLamps, ReportsCountsAndResidualsOfLevelFixes) {
   Random random(71);
   const SyntheticRig rig = make_rig_with_unequal_focal_lengths(0.02);
   auto frames = with_noise(drive(rig, 9, random, 0.1), random);
@@ -73,7 +73,7 @@ TEST(EstimateCameraTiltFromLamps, ReportsCountsAndResidualsOfLevelFixes) {
   EXPECT_EQ(result.map.lamps[3].position_m, rig.map.lamps[3].position_m);
 }
 
-TEST(EstimateCameraTiltFromLamps, NoiseScaleIsRatioOfResidualsToStatedNoiseIfAllIsStated) {
+TEST(EstimateTiltFromLamps, NoiseScaleIsRatioOfResidualsToStatedNoiseIfAllIsStated) {
   Random random(75);
   const SyntheticRig rig = make_tilted_rig(0.02, 1);
   auto frames = with_noise(drive(rig, 20, random, 0.3), random);
@@ -90,7 +90,7 @@ TEST(EstimateCameraTiltFromLamps, NoiseScaleIsRatioOfResidualsToStatedNoiseIfAll
 }
 
 /// The residuals of a level camera exceed the stated noise of pixels and lamps by far.
-TEST(EstimateCameraTiltFromLamps, KeepsAllDetectionsOfTiltedCameraDespiteSmallStatedNoise) {
+TEST(EstimateTiltFromLamps, KeepsAllDetectionsOfTiltedCameraDespiteSmallStatedNoise) {
   Random random(76);
   SyntheticRig rig = make_tilted_rig(0.06, 1);
   for (Lamp& lamp : rig.map.lamps) lamp.sd_m = 1e-4;
@@ -106,7 +106,7 @@ TEST(EstimateCameraTiltFromLamps, KeepsAllDetectionsOfTiltedCameraDespiteSmallSt
 
 /// An exact lamp with a wrong position stays in use, and detections without sigma_px have equal
 /// weights in the undistorted image. Other settings of the adjustment give another zenith.
-TEST(EstimateCameraTiltFromLamps, UsesCheckedCapturesAndWeightsOfUndistortedImage) {
+TEST(EstimateTiltFromLamps, UsesCheckedCapturesAndWeightsOfUndistortedImage) {
   Random random(77);
   SyntheticRig rig = make_tilted_rig(0.01, 1);
   auto frames = with_noise(drive(rig, 8, random, 0.2), random);
@@ -122,7 +122,7 @@ TEST(EstimateCameraTiltFromLamps, UsesCheckedCapturesAndWeightsOfUndistortedImag
     for (const Frame& frame : frames) input.captures.push_back({frame.image, frame.detections});
     input.captures_are_checked = checked;
     input.weighs_in_undistorted_image = undistorted;
-    const AdjustmentResult adjusted = run_bundle_adjustment(input, {1, 1});
+    const AdjustmentResult adjusted = adjust_bundle(input, {1, 1});
     EXPECT_EQ(adjusted.undetermined, "");
     return adjusted.center.zenith_in_camera;
   };

@@ -55,16 +55,14 @@ TEST(BoardDetector, LocatesCornersOfCurvedTagsWithinHundredthsOfPixel) {
   const BoardDetector detector(scene.board->pattern);
   Errors of_long, of_others;
   for (std::size_t index = 0; index < 6; ++index) {
-    const BoardShot shot = make_board_capture_parameters(scene, views, index);
+    const BoardShot shot = make_board_shot(scene, views, index);
     std::map<int, Corners> truth;
     std::map<int, int> seen_corners;
-    for (const auto& [tag, corner, pixel] :
-         project_scene_corners_into_image(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] : list_true_corners(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
       ++seen_corners[*tag];
     }
-    const cv::Mat image =
-        simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), 1);
+    const cv::Mat image = simulate_sensor_image(scene.sensor, renderer.render_board(shot), 1);
     for (const TagDetection& tag : detector.detect_board(image).tags) {
       if (seen_corners[tag.id] < 4) continue;
       Errors& errors = longest_px(truth[tag.id]) > long_px ? of_long : of_others;

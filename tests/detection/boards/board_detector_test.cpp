@@ -32,12 +32,11 @@ class BoardDetectorOnRenderedBoard : public testing::TestWithParam<const char*> 
     const CsvTable table(rig / "sample-boards/true_corners.csv");
     std::map<int, std::array<Eigen::Vector2d, 4>> corners;
     for (std::size_t row = 0; row < static_cast<std::size_t>(table.num_rows()); ++row) {
-      const int tag =
-          static_cast<int>(table.get_cell_number(row, table.get_required_column("tag")));
+      const int tag = static_cast<int>(table.get_cell_number(row, table.require_column("tag")));
       const auto k =
-          static_cast<std::size_t>(table.get_cell_number(row, table.get_required_column("corner")));
-      corners[tag][k] = {table.get_cell_number(row, table.get_required_column("u_px")),
-                         table.get_cell_number(row, table.get_required_column("v_px"))};
+          static_cast<std::size_t>(table.get_cell_number(row, table.require_column("corner")));
+      corners[tag][k] = {table.get_cell_number(row, table.require_column("u_px")),
+                         table.get_cell_number(row, table.require_column("v_px"))};
     }
     return corners;
   }

@@ -262,7 +262,7 @@ TEST(WriteCornerTable, WritesRowWithNameOnlyForImageWithoutCorners) {
     const auto read = read_corner_table(folder / "corners.csv", board, kImager);
     ASSERT_EQ(read.size(), 2U);
     EXPECT_EQ(read[1].image, "b.png");
-    EXPECT_FALSE(read[1].detection.has_detected_corners());
+    EXPECT_FALSE(read[1].detection.has_corners());
   }
 }
 
@@ -275,7 +275,7 @@ TEST(WriteCornerTable, WritesViewThatHasOnlyForeignTags) {
   write_corner_table(folder / "corners.csv", views, make_board_of_three_tags());
   const CsvTable table(folder / "corners.csv");
   EXPECT_EQ(table.num_rows(), 4U);
-  EXPECT_EQ(table.get_cell_text(0, table.get_required_column("tag")), "7");
+  EXPECT_EQ(table.get_cell_text(0, table.require_column("tag")), "7");
 }
 
 }  // namespace

@@ -93,9 +93,8 @@ TEST(BoardDetector, DetectsNoCornersInTinyImages) {
   board.kind = BoardKind::charuco;
   board.square_size_m = 0.02;
   for (const auto& [width, height] : {std::pair(9, 50), std::pair(50, 9), std::pair(10, 10)}) {
-    EXPECT_FALSE(BoardDetector(board)
-                     .detect_board(cv::Mat1b(height, width, uchar{100}))
-                     .has_detected_corners());
+    EXPECT_FALSE(
+        BoardDetector(board).detect_board(cv::Mat1b(height, width, uchar{100})).has_corners());
   }
 }
 
@@ -114,7 +113,7 @@ TEST(BoardDetector, DetectsTagsWithBordersOfTwoAndThreeBits) {
   }
 }
 
-TEST(MakeApriltagDetector, CorrectsTwoWrongBits) {
+TEST(MakeApriltagFinder, CorrectsTwoWrongBits) {
   constexpr int bit_px = 6;
   for (const auto& [border_bits, id] : {std::pair(1, 0), {2, 0}, {2, 1}, {2, 2}, {2, 3}}) {
     Board board = make_board();
@@ -122,7 +121,7 @@ TEST(MakeApriltagDetector, CorrectsTwoWrongBits) {
     board.first_id = id;
     const DrawnTags drawn(board, bit_px);
     const Eigen::Vector2i top_left = drawn.truth[0].corners_px[3].array().ceil().cast<int>();
-    const auto finder = make_apriltag_detector(board);
+    const auto finder = make_apriltag_finder(board);
     cv::Mat1b image = drawn.image.clone();
     for (const std::size_t num_wrong : {1U, 2U, 3U}) {
       // Bits in the inner rows, one in each.

@@ -20,7 +20,7 @@ struct DrawnTags {
 
   DrawnTags(const Board& drawn_board, int bit_px) : board(drawn_board) {
     const TagFamily family = make_tag_family(board.family);
-    const int width_px = tag_width_with_border_in_bits(*family, board.border_bits) * bit_px;
+    const int width_px = tag_width_bits(*family, board.border_bits) * bit_px;
     const int gap_px = static_cast<int>(std::lround(board.tag_spacing * width_px));
     const double px_per_m = width_px / board.tag_size_m;
     image = cv::Mat1b(board.rows * (width_px + gap_px) + 2 * kMargin_px,

@@ -42,21 +42,21 @@ struct CurvedEdgeCorner {
   }
 
   std::optional<FittedCorner> fit_corner() const {
-    return fit_edge_intersection_at_corner(render_image(), corner_px + Eigen::Vector2d(0.4, -0.3),
-                                           {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
+    return fit_edge_crossing(render_image(), corner_px + Eigen::Vector2d(0.4, -0.3),
+                             {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
   }
 };
 
 constexpr double kTolerance_px = 0.01;  // gray levels are rounded to integers
 
-TEST(FitEdgeIntersectionAtCorner, ReturnsCornerOfStraightEdges) {
+TEST(FitEdgeCrossing, ReturnsCornerOfStraightEdges) {
   const CurvedEdgeCorner corner;
   const auto found = corner.fit_corner();
   ASSERT_TRUE(found);
   EXPECT_THAT(found->pixel, IsNear(corner.corner_px, kTolerance_px));
 }
 
-TEST(FitEdgeIntersectionAtCorner, ReturnsCornerOfEdgesWithDifferentCurvatures) {
+TEST(FitEdgeCrossing, ReturnsCornerOfEdgesWithDifferentCurvatures) {
   for (const std::array<double, 2> curvatures :
        {std::array{0.01, 0.0}, {0.0, 0.01}, {-0.01, 0.02}, {0.02, 0.015}}) {
     CurvedEdgeCorner corner;
@@ -69,7 +69,7 @@ TEST(FitEdgeIntersectionAtCorner, ReturnsCornerOfEdgesWithDifferentCurvatures) {
 }
 
 /// The scatter of corners in noisy images agrees with the reported standard deviation.
-TEST(FitEdgeIntersectionAtCorner, ReportsScatterOfNoisyImages) {
+TEST(FitEdgeCrossing, ReportsScatterOfNoisyImages) {
   for (const double noise : {2.0, 6.0}) {
     CurvedEdgeCorner corner;
     cv::RNG random(7);
@@ -82,8 +82,8 @@ TEST(FitEdgeIntersectionAtCorner, ReportsScatterOfNoisyImages) {
       random.fill(noise_levels, cv::RNG::NORMAL, 0, noise);
       cv::Mat1b image;
       cv::Mat(levels + noise_levels).convertTo(image, CV_8U);
-      const auto found = fit_edge_intersection_at_corner(
-          image, corner.corner_px, {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
+      const auto found = fit_edge_crossing(image, corner.corner_px,
+                                           {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
       ASSERT_TRUE(found);
       squares_px2 += (found->pixel - corner.corner_px).squaredNorm() / 2;
       variances_px2 += found->sd_px * found->sd_px;
@@ -92,7 +92,7 @@ TEST(FitEdgeIntersectionAtCorner, ReportsScatterOfNoisyImages) {
   }
 }
 
-TEST(FitEdgeIntersectionAtCorner, LightGradientDoesNotDisplaceCorner) {
+TEST(FitEdgeCrossing, LightGradientDoesNotDisplaceCorner) {
   CurvedEdgeCorner corner;
   corner.light_per_px = {0.02, -0.01};
   corner.curvatures_per_px = {0.01, -0.01};
@@ -102,7 +102,7 @@ TEST(FitEdgeIntersectionAtCorner, LightGradientDoesNotDisplaceCorner) {
 }
 
 // Each image ends 4 px beyond the corner on one side, and is a part of a larger, black one.
-TEST(FitEdgeIntersectionAtCorner, UsesOnlyPixelsInsideImage) {
+TEST(FitEdgeCrossing, UsesOnlyPixelsInsideImage) {
   const CurvedEdgeCorner corner;
   const cv::Mat1b image = corner.render_image();
   constexpr int margin_px = 4, border_px = 10;
@@ -117,23 +117,20 @@ TEST(FitEdgeIntersectionAtCorner, UsesOnlyPixelsInsideImage) {
     cv::Mat1b larger;
     cv::copyMakeBorder(image(part).clone(), larger, border_px, border_px, border_px, border_px,
                        cv::BORDER_CONSTANT, cv::Scalar(0));
-    const auto found =
-        fit_edge_intersection_at_corner(larger(cv::Rect({border_px, border_px}, part.size())),
-                                        corner.corner_px - origin + Eigen::Vector2d(0.4, -0.3),
-                                        {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
+    const auto found = fit_edge_crossing(larger(cv::Rect({border_px, border_px}, part.size())),
+                                         corner.corner_px - origin + Eigen::Vector2d(0.4, -0.3),
+                                         {Eigen::Vector2d(1, 0.1), Eigen::Vector2d(-0.02, 1)}, 8);
     ASSERT_TRUE(found);
     EXPECT_THAT(found->pixel, IsNear(corner.corner_px - origin, kTolerance_px));
   }
 }
 
-TEST(FitEdgeIntersectionAtCorner, ReturnsNulloptWithoutCorner) {
+TEST(FitEdgeCrossing, ReturnsNulloptWithoutCorner) {
   const std::array<Eigen::Vector2d, 2> along{Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)};
-  EXPECT_FALSE(fit_edge_intersection_at_corner(cv::Mat1b(41, 41, 100), {20, 20}, along, 8));
-  EXPECT_FALSE(
-      fit_edge_intersection_at_corner(CurvedEdgeCorner().render_image(), {20, 20}, along, 2))
+  EXPECT_FALSE(fit_edge_crossing(cv::Mat1b(41, 41, 100), {20, 20}, along, 8));
+  EXPECT_FALSE(fit_edge_crossing(CurvedEdgeCorner().render_image(), {20, 20}, along, 2))
       << "13 pixels";
-  EXPECT_FALSE(
-      fit_edge_intersection_at_corner(CurvedEdgeCorner().render_image(), {25, 20}, along, 8))
+  EXPECT_FALSE(fit_edge_crossing(CurvedEdgeCorner().render_image(), {25, 20}, along, 8))
       << "far from the guess";
 }
 

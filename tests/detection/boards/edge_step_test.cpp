@@ -57,12 +57,12 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
   std::vector<BoardView> views;
   views.reserve(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const BoardShot shot = make_board_capture_parameters(scene, set, i);
-    const cv::Mat image = simulate_sensor_image(
-        scene.sensor, renderer.render_board_in_electrons(shot), i, scene.processing);
+    const BoardShot shot = make_board_shot(scene, set, i);
+    const cv::Mat image =
+        simulate_sensor_image(scene.sensor, renderer.render_board(shot), i, scene.processing);
     views.push_back({shot.image, scene.camera.imager_px, detector.detect_board(image)});
   }
-  correct_views_for_tone_curve(views, sum_tone_curve_costs(views));
+  correct_views(views, sum_tone_curve_costs(views));
   std::vector<double> blurs_px, ratios;
   for (const BoardView& view : views) {
     for (const TagDetection& tag : view.detection.tags) {
@@ -77,7 +77,7 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
   }
   if (blurs_px.empty()) return {};
   const std::size_t edges = blurs_px.size();
-  return {edges, compute_mtf50_of_gaussian_blur(upper_median(blurs_px)), upper_median(ratios)};
+  return {edges, compute_mtf50_of_blur(upper_median(blurs_px)), upper_median(ratios)};
 }
 
 Scene station_scene() { return read_scene_file(VLP_SOURCE_DIR "/datasets/station/scene.yaml"); }

@@ -38,11 +38,11 @@ class BoardDetectorYield : public testing::TestWithParam<Pictures> {
   const Board& board = scene.board->pattern;
 
   cv::Mat image(const FrameRenderer& renderer, const CaptureSet& set, std::size_t index) const {
-    const BoardShot shot = make_board_capture_parameters(scene, set, index);
+    const BoardShot shot = make_board_shot(scene, set, index);
     const auto& picture = GetParam().picture;
-    const cv::Mat exposed = simulate_sensor_image(
-        scene.sensor, renderer.render_board_in_electrons(shot), shot.noise_seed, picture);
-    return cv::imdecode(encode_image_as_jpeg_or_png(exposed, picture), cv::IMREAD_GRAYSCALE);
+    const cv::Mat exposed =
+        simulate_sensor_image(scene.sensor, renderer.render_board(shot), shot.noise_seed, picture);
+    return cv::imdecode(encode_image(exposed, picture), cv::IMREAD_GRAYSCALE);
   }
   std::set<int> detect_ids(const TagFinder& finder, const cv::Mat& image) const {
     std::set<int> ids;
@@ -59,13 +59,13 @@ TEST_P(BoardDetectorYield, KeepsAtLeast95PercentOfTagsThatTagFinderDetects) {
   constexpr std::size_t views = 36, apart = 3;
   CaptureSet set = *std::find_if(scene.sets.begin(), scene.sets.end(),
                                  [](const CaptureSet& each) { return each.folder == "boards"; });
-  const double white_e = (sensor_white_level_dn(scene.sensor) - scene.sensor.black_level_dn) /
-                         scene.sensor.gain_dn_per_e;
+  const double white_e =
+      (white_level_dn(scene.sensor) - scene.sensor.black_level_dn) / scene.sensor.gain_dn_per_e;
   set.exposure_s = GetParam().white * white_e / scene.board->white_e_per_s;
   const FrameRenderer renderer(scene);
   const BoardDetector detector(board);
   const auto finder =
-      board.corner_squares ? make_aruco_detector(board) : make_apriltag_detector(board);
+      board.corner_squares ? make_aruco_detector(board) : make_apriltag_finder(board);
   double all = 0, kept = 0;
   for (std::size_t index = 0; index < views; index += apart) {
     const cv::Mat picture = image(renderer, set, index);

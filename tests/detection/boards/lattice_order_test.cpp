@@ -45,31 +45,31 @@ void expect_numbered_from_top_left(const std::vector<PointDetection>& points, in
   }
 }
 
-TEST(RenumberLatticePoints, CountsRowsDownwards) {
+TEST(RenumberLattice, CountsRowsDownwards) {
   for (const bool is_symmetric : {false, true}) {
     auto points = make_points(4, 3, [](Node node) { return 4 * node.row + node.col; });
-    renumber_lattice_points(points, 4, 3, is_symmetric);
+    renumber_lattice(points, 4, 3, is_symmetric);
     expect_numbered_from_top_left(points, 4);
     points = make_points(4, 3, [](Node node) { return 4 * (2 - node.row) + node.col; });
-    renumber_lattice_points(points, 4, 3, is_symmetric);
+    renumber_lattice(points, 4, 3, is_symmetric);
     expect_numbered_from_top_left(points, 4);
   }
 }
 
-TEST(RenumberLatticePoints, RotatesOnlySymmetricLatticesBy180Degrees) {
+TEST(RenumberLattice, RotatesOnlySymmetricLatticesBy180Degrees) {
   const auto make_rotated = [] {
     return make_points(5, 3, [](Node node) { return 14 - 5 * node.row - node.col; });
   };
   auto points = make_rotated();
-  renumber_lattice_points(points, 5, 3, true);
+  renumber_lattice(points, 5, 3, true);
   expect_numbered_from_top_left(points, 5);
   points = make_rotated();
-  renumber_lattice_points(points, 5, 3, false);
+  renumber_lattice(points, 5, 3, false);
   EXPECT_EQ(points[0].pixel, make_rotated()[0].pixel);
   EXPECT_EQ(points[14].pixel, make_rotated()[14].pixel);
 }
 
-TEST(RenumberLatticePoints, RotatesSquareLatticesBy90Degrees) {
+TEST(RenumberLattice, RotatesSquareLatticesBy90Degrees) {
   const std::array<std::function<int(Node)>, 8> numberings{
       [](Node node) { return 3 * node.row + node.col; },
       [](Node node) { return 3 * (2 - node.row) + node.col; },
@@ -82,7 +82,7 @@ TEST(RenumberLatticePoints, RotatesSquareLatticesBy90Degrees) {
   for (std::size_t i = 0; i < numberings.size(); ++i) {
     SCOPED_TRACE(i);
     auto points = make_points(3, 3, numberings[i]);
-    renumber_lattice_points(points, 3, 3, true);
+    renumber_lattice(points, 3, 3, true);
     expect_numbered_from_top_left(points, 3);
   }
 }
@@ -98,12 +98,12 @@ LatticePixels make_lattice(std::size_t cols, std::size_t rows) {
   return pixels;
 }
 
-TEST(EstimatePointsPerLatticeRow, ReturnsLengthOfRows) {
+TEST(EstimatePointsPerRow, ReturnsLengthOfRows) {
   for (const std::size_t cols : {3U, 4U, 6U, 8U}) {
     const std::vector images{make_lattice(cols, 24 / cols), make_lattice(cols, 24 / cols)};
     for (const std::size_t stated : {3U, 4U, 6U, 8U}) {
       const std::size_t expected = cols % stated == 0 ? stated : cols;  // parts of rows are even
-      EXPECT_EQ(estimate_points_per_lattice_row(images, stated), expected) << cols << stated;
+      EXPECT_EQ(estimate_points_per_row(images, stated), expected) << cols << stated;
     }
   }
 }

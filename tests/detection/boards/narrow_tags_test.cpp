@@ -70,7 +70,7 @@ struct NarrowTag {
   }
 };
 
-TEST(RefineTagsByEdgeFits, BitsDoNotDisplaceCornersOfNarrowTags) {
+TEST(RefineTags, BitsDoNotDisplaceCornersOfNarrowTags) {
   const Board board{"tag36h11", 1, 1, 0.1, 0.6, 1, false, 0, {false, BoardCorner::top_left}};
   for (const int id : {3, 100, 371}) {
     for (const double angle_rad : {0.25, 1.9, -2.4}) {
@@ -79,7 +79,7 @@ TEST(RefineTagsByEdgeFits, BitsDoNotDisplaceCornersOfNarrowTags) {
         const NarrowTag tag{.id = id, .bit_px = bit_px, .angle_rad = angle_rad};
         std::vector<TagDetection> tags{{id, tag.corners_px()}};
         for (auto& corner : tags[0].corners_px) corner += Eigen::Vector2d(0.15, -0.1);
-        refine_tags_by_edge_fits(tags, tag.render(), TagGeometry(board));
+        refine_tags(tags, tag.render(), TagGeometry(board));
         for (std::size_t k = 0; k < 4; ++k) {
           EXPECT_THAT(tags[0].corners_px[k], IsNear(tag.corners_px()[k], 0.025)) << k;
           EXPECT_NEAR(tags[0].steps[k].blur_px, tag.blur_px, 0.03) << k;

@@ -17,45 +17,42 @@ Board make_board_of_family(const std::string& family, int cols = 3, int rows = 2
   return {family, cols, rows, 0.05, 0.4, 1, false, 0, {false, BoardCorner::top_left}};
 }
 
-TEST(FindAndDescribeTagsOfOtherKinds, ReturnsEmptyForStatedBoard) {
+TEST(DescribeOtherTags, ReturnsEmptyForStatedBoard) {
   const DrawnTags drawn(make_board_of_family("tag36h11"), 5);
-  EXPECT_EQ(find_and_describe_tags_of_other_kinds(drawn.board, drawn.image), "");
+  EXPECT_EQ(describe_other_tags(drawn.board, drawn.image), "");
 }
 
-TEST(FindAndDescribeTagsOfOtherKinds, ReportsMirroredImage) {
+TEST(DescribeOtherTags, ReportsMirroredImage) {
   const DrawnTags drawn(make_board_of_family("tag36h11", 2, 2), 5);
   cv::Mat1b mirrored;
   cv::flip(drawn.image, mirrored, 1);
-  EXPECT_EQ(find_and_describe_tags_of_other_kinds(drawn.board, mirrored),
+  EXPECT_EQ(describe_other_tags(drawn.board, mirrored),
             "the image is mirrored: mirror it back, or turn mirroring off in the camera");
 }
 
-TEST(FindAndDescribeTagsOfOtherKinds, NamesOtherFamilyOfFourTagsOrMore) {
+TEST(DescribeOtherTags, NamesOtherFamilyOfFourTagsOrMore) {
   const DrawnTags four(make_board_of_family("tag25h9", 2, 2), 5);
-  EXPECT_EQ(find_and_describe_tags_of_other_kinds(make_board_of_family("tag36h11"), four.image),
+  EXPECT_EQ(describe_other_tags(make_board_of_family("tag36h11"), four.image),
             "the image shows tags of family tag25h9, border_bits 1, corner_squares false");
   const DrawnTags three(make_board_of_family("tag25h9", 3, 1), 5);
-  EXPECT_EQ(find_and_describe_tags_of_other_kinds(make_board_of_family("tag36h11"), three.image),
-            "");
+  EXPECT_EQ(describe_other_tags(make_board_of_family("tag36h11"), three.image), "");
 }
 
-TEST(FindAndDescribeTagsOfOtherKinds, StatesBorderBitsAndCornerSquares) {
+TEST(DescribeOtherTags, StatesBorderBitsAndCornerSquares) {
   const cv::Mat kalibr =
       read_image(VLP_SOURCE_DIR "/datasets/paper-rig-faulty/rendered/sample-boards/0000.png");
-  EXPECT_EQ(find_and_describe_tags_of_other_kinds(make_board_of_family("tag36h11"), kalibr),
+  EXPECT_EQ(describe_other_tags(make_board_of_family("tag36h11"), kalibr),
             "the image shows tags of family tag36h11, border_bits 2, corner_squares true");
   Board wide = make_board_of_family("tag36h11");
   wide.border_bits = 2;
-  EXPECT_EQ(find_and_describe_tags_of_other_kinds(make_board_of_family("tag36h11"),
-                                                  DrawnTags(wide, 4).image),
+  EXPECT_EQ(describe_other_tags(make_board_of_family("tag36h11"), DrawnTags(wide, 4).image),
             "the image shows tags of family tag36h11, border_bits 2, corner_squares false");
-  EXPECT_EQ(find_and_describe_tags_of_other_kinds(
-                wide, DrawnTags(make_board_of_family("tag36h11"), 4).image),
+  EXPECT_EQ(describe_other_tags(wide, DrawnTags(make_board_of_family("tag36h11"), 4).image),
             "the image shows tags of family tag36h11, border_bits 1, corner_squares false");
 }
 
 // The image has more tags of another family than tags of the board.
-TEST(FindAndDescribeTagsOfOtherKinds, NamesOtherFamilyOnlyWithMoreTagsThanBoard) {
+TEST(DescribeOtherTags, NamesOtherFamilyOnlyWithMoreTagsThanBoard) {
   const DrawnTags own(make_board_of_family("tag36h11", 5, 1), 5);
   for (const auto& [cols, is_named] : {std::pair(5, false), std::pair(6, true)}) {
     const DrawnTags other(make_board_of_family("tag25h9", cols, 1), 5);
@@ -63,17 +60,15 @@ TEST(FindAndDescribeTagsOfOtherKinds, NamesOtherFamilyOnlyWithMoreTagsThanBoard)
                    DrawnTags::kWhite);
     own.image.copyTo(both(cv::Rect({0, 0}, own.image.size())));
     other.image.copyTo(both(cv::Rect({0, own.image.rows}, other.image.size())));
-    EXPECT_EQ(find_and_describe_tags_of_other_kinds(own.board, both).empty(), !is_named) << cols;
+    EXPECT_EQ(describe_other_tags(own.board, both).empty(), !is_named) << cols;
   }
 }
 
-TEST(FindAndDescribeTagsOfOtherKinds, ReturnsEmptyForChessboards) {
+TEST(DescribeOtherTags, ReturnsEmptyForChessboards) {
   Board board = make_board_of_family("");
   board.kind = BoardKind::chessboard;
   board.square_size_m = 0.02;
-  EXPECT_EQ(find_and_describe_tags_of_other_kinds(
-                board, DrawnTags(make_board_of_family("tag36h11"), 4).image),
-            "");
+  EXPECT_EQ(describe_other_tags(board, DrawnTags(make_board_of_family("tag36h11"), 4).image), "");
 }
 
 }  // namespace

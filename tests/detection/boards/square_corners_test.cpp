@@ -126,7 +126,7 @@ TEST(SquareCorners, KeepsOnlyAccurateCornersWhenOneMarkerIsDisplaced) {
   ASSERT_EQ(seen.tags.size(), list_board_tags(board).size());
   for (const double off_px : {30.0, 1e12}) {
     for (auto& corner_px : seen.tags[7].corners_px) corner_px.x() += off_px;
-    const auto points = SquareCorners(board).detect_corners_near_markers(seen.tags, gray);
+    const auto points = SquareCorners(board).detect_near_markers(seen.tags, gray);
     EXPECT_GE(points.size(), 8U);
     EXPECT_LT(points.size(), seen.points.size());
     for (const PointDetection& point : points) {
@@ -240,16 +240,16 @@ TEST(OtherBoardKinds, MarkerDictionaryIsNamed) {
   Board charuco = squares(BoardKind::charuco, 7, 5);
   const cv::Mat markers = drawn_by_opencv(charuco);
   charuco.family = "DICT_4X4_50";
-  EXPECT_EQ(find_and_describe_tags_of_other_kinds(charuco, markers),
+  EXPECT_EQ(describe_other_tags(charuco, markers),
             "the image shows markers of DICT_5X5, the largest of id 16");
 }
 
-TEST(RenumberLatticePoints, ReversesRowsThatAreNumberedUpwards) {
+TEST(RenumberLattice, ReversesRowsThatAreNumberedUpwards) {
   std::vector<PointDetection> points;
   for (std::size_t i = 0; i < 12; ++i) {
     points.push_back({i, {10.0 * static_cast<double>(i % 4), -10.0 * static_cast<double>(i / 4)}});
   }
-  renumber_lattice_points(points, 4, 3, false);
+  renumber_lattice(points, 4, 3, false);
   EXPECT_EQ(points[0].pixel, Eigen::Vector2d(0, -20));
   EXPECT_EQ(points[11].pixel, Eigen::Vector2d(30, 0));
 }

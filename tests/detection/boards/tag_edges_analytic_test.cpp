@@ -114,15 +114,14 @@ AnalyticTag make_square(double low_px, double width_px) {
                          {low_px, low_px}}};
 }
 
-TEST(RefineTagsByEdgeFits, MeasuresCornersAndStepsOfStraightEdgesUnderUnevenLight) {
+TEST(RefineTags, MeasuresCornersAndStepsOfStraightEdgesUnderUnevenLight) {
   for (const bool is_clockwise : {false, true}) {
     for (const double outwards_px : {-1.2, 0.0, 1.2}) {
       SCOPED_TRACE(outwards_px);
       AnalyticTag tag = make_quadrilateral(is_clockwise);
       tag.gradient = {0.002, -0.003};
       auto tags = make_detections({tag}, outwards_px);
-      refine_tags_by_edge_fits(tags, render_tags({tag}),
-                               TagGeometry(make_board_with_wide_borders()));
+      refine_tags(tags, render_tags({tag}), TagGeometry(make_board_with_wide_borders()));
       for (std::size_t k = 0; k < 4; ++k) {
         EXPECT_THAT(tags[0].corners_px[k], IsNear(tag.corners_px[k], 0.01)) << k;
         EXPECT_NEAR(tags[0].curvatures[k].quadratic_px, 0, 0.01);
@@ -136,7 +135,7 @@ TEST(RefineTagsByEdgeFits, MeasuresCornersAndStepsOfStraightEdgesUnderUnevenLigh
   }
 }
 
-TEST(RefineTagsByEdgeFits, MeasuresCurvatureOfEachEdge) {
+TEST(RefineTags, MeasuresCurvatureOfEachEdge) {
   for (const bool is_clockwise : {false, true}) {
     for (const double outwards_px : {-0.3, 0.0, 0.8}) {
       SCOPED_TRACE(outwards_px);
@@ -144,8 +143,7 @@ TEST(RefineTagsByEdgeFits, MeasuresCurvatureOfEachEdge) {
       tag.quadratic_px = {0.3, -0.4, 0.9, -2};
       tag.cubic_px = {0, 0, 0, 0.5};
       auto tags = make_detections({tag}, outwards_px);
-      refine_tags_by_edge_fits(tags, render_tags({tag}),
-                               TagGeometry(make_board_with_wide_borders()));
+      refine_tags(tags, render_tags({tag}), TagGeometry(make_board_with_wide_borders()));
       for (std::size_t k = 0; k < 4; ++k) {
         EXPECT_THAT(tags[0].corners_px[k], IsNear(tag.corners_px[k], 0.03)) << k;
         EXPECT_NEAR(tags[0].curvatures[k].quadratic_px, tag.quadratic_px[k], 0.02) << k;
@@ -156,11 +154,11 @@ TEST(RefineTagsByEdgeFits, MeasuresCurvatureOfEachEdge) {
 }
 
 // Pixels extend to 2.5 px from the adjacent edges.
-TEST(RefineTagsByEdgeFits, ReachIsExtentOfPixelsRelativeToFittedEdge) {
+TEST(RefineTags, ReachIsExtentOfPixelsRelativeToFittedEdge) {
   for (const double outwards_px : {-1.4, 0.0, 1.4}) {
     const AnalyticTag tag = make_square(40.2, 40);
     auto tags = make_detections({tag}, outwards_px);
-    refine_tags_by_edge_fits(tags, render_tags({tag}), TagGeometry(make_board_with_wide_borders()));
+    refine_tags(tags, render_tags({tag}), TagGeometry(make_board_with_wide_borders()));
     const double expected = (40 - 2 * (2.5 - outwards_px / std::numbers::sqrt2)) / 40;
     for (const EdgeCurvature& curvature : tags[0].curvatures) {
       EXPECT_NEAR(curvature.reach, expected, 0.015) << outwards_px;
@@ -170,15 +168,15 @@ TEST(RefineTagsByEdgeFits, ReachIsExtentOfPixelsRelativeToFittedEdge) {
 
 // The ends of a line that is fitted to n pixels have the variance 4 sigma^2 / n, those of a
 // parabola 9 sigma^2 / n: corner_sds_px counts curvatures as known, and here they are estimated.
-TEST(RefineTagsByEdgeFits, CornerSdsMatchErrorsOfNoisyImages) {
+TEST(RefineTags, CornerSdsMatchErrorsOfNoisyImages) {
   AnalyticTag tag = make_quadrilateral();
   tag.gradient = {0.002, 0.001};
   double squares = 0;
   constexpr int images = 50;
   for (unsigned seed = 1; seed <= images; ++seed) {
     auto tags = make_detections({tag});
-    refine_tags_by_edge_fits(tags, render_tags({tag}, {.noise = 4, .seed = seed}),
-                             TagGeometry(make_board_with_wide_borders()));
+    refine_tags(tags, render_tags({tag}, {.noise = 4, .seed = seed}),
+                TagGeometry(make_board_with_wide_borders()));
     for (std::size_t k = 0; k < 4; ++k) {
       ASSERT_GT(tags[0].corner_sds_px[k], 0);
       squares +=
@@ -189,7 +187,7 @@ TEST(RefineTagsByEdgeFits, CornerSdsMatchErrorsOfNoisyImages) {
   EXPECT_NEAR(squares / (8 * images), 9 / 4.0, 0.35);
 }
 
-TEST(RefineTagsByEdgeFits, CornerSdsIncreaseWithInverseSineOfAngle) {
+TEST(RefineTags, CornerSdsIncreaseWithInverseSineOfAngle) {
   std::vector<double> sds_px;
   for (const double angle_rad : {0.5, 0.9, std::numbers::pi / 2, 2.2}) {
     const Eigen::Vector2d origin(22.3, 100.2), right(60, 0),
@@ -198,8 +196,8 @@ TEST(RefineTagsByEdgeFits, CornerSdsIncreaseWithInverseSineOfAngle) {
     const double shift_px = std::max(0.0, -up.x());
     for (auto& corner : tag.corners_px) corner.x() += shift_px;
     auto tags = make_detections({tag});
-    refine_tags_by_edge_fits(tags, render_tags({tag}, {.size = {160, 130}, .noise = 4}),
-                             TagGeometry(make_board_with_wide_borders()));
+    refine_tags(tags, render_tags({tag}, {.size = {160, 130}, .noise = 4}),
+                TagGeometry(make_board_with_wide_borders()));
     double variance_px2 = 0;
     for (const double sd_px : tags[0].corner_sds_px) variance_px2 += sd_px * sd_px / 4;
     ASSERT_GT(variance_px2, 0);
@@ -208,13 +206,13 @@ TEST(RefineTagsByEdgeFits, CornerSdsIncreaseWithInverseSineOfAngle) {
   for (const double sd_px : sds_px) EXPECT_NEAR(sd_px / sds_px[2], 1, 0.1);
 }
 
-TEST(RefineTagsByEdgeFits, MeasuresStepsOfStronglyBlurredEdges) {
+TEST(RefineTags, MeasuresStepsOfStronglyBlurredEdges) {
   for (const double blur_px : {1.4, 1.9, 2.4}) {
     SCOPED_TRACE(blur_px);
     AnalyticTag tag = make_quadrilateral();
     tag.blur_px = blur_px;
     auto tags = make_detections({tag});
-    refine_tags_by_edge_fits(tags, render_tags({tag}), TagGeometry(make_board_with_wide_borders()));
+    refine_tags(tags, render_tags({tag}), TagGeometry(make_board_with_wide_borders()));
     for (std::size_t k = 0; k < 4; ++k) {
       EXPECT_NEAR(tags[0].steps[k].blur_px, blur_px, 0.02 * blur_px) << k;
       EXPECT_NEAR(tags[0].steps[k].dark, tag.dark, 1) << k;
@@ -223,7 +221,7 @@ TEST(RefineTagsByEdgeFits, MeasuresStepsOfStronglyBlurredEdges) {
   }
 }
 
-TEST(RefineTagsByEdgeFits, FitForTrueToneCurveReturnsCornersAndSteps) {
+TEST(RefineTags, FitForTrueToneCurveReturnsCornersAndSteps) {
   for (const std::size_t curve : {1U, 3U}) {
     for (const double blur_px : {0.8, 1.6}) {
       SCOPED_TRACE(testing::Message() << kGammas[curve] << " " << blur_px);
@@ -231,9 +229,8 @@ TEST(RefineTagsByEdgeFits, FitForTrueToneCurveReturnsCornersAndSteps) {
       tag.blur_px = blur_px;
       tag.quadratic_px = {0.2, -0.7, 0.3, 0};
       auto tags = make_detections({tag});
-      const auto costs =
-          refine_tags_by_edge_fits(tags, render_tags({tag}, {.gamma = kGammas[curve]}),
-                                   TagGeometry(make_board_with_wide_borders()));
+      const auto costs = refine_tags(tags, render_tags({tag}, {.gamma = kGammas[curve]}),
+                                     TagGeometry(make_board_with_wide_borders()));
       ASSERT_EQ(costs.size(), kGammas.size());
       EXPECT_EQ(std::ranges::min_element(costs) - costs.begin(),
                 static_cast<std::ptrdiff_t>(curve));
@@ -251,13 +248,13 @@ TEST(RefineTagsByEdgeFits, FitForTrueToneCurveReturnsCornersAndSteps) {
   }
 }
 
-TEST(RefineTagsByEdgeFits, ReturnsCornersButNoStepsOfSaturatedEdges) {
+TEST(RefineTags, ReturnsCornersButNoStepsOfSaturatedEdges) {
   for (const double gamma : {1.0, 2.0}) {
     AnalyticTag tag = make_quadrilateral();
     tag.bright = 330;
     auto tags = make_detections({tag});
-    const auto costs = refine_tags_by_edge_fits(tags, render_tags({tag}, {.gamma = gamma}),
-                                                TagGeometry(make_board_with_wide_borders()));
+    const auto costs = refine_tags(tags, render_tags({tag}, {.gamma = gamma}),
+                                   TagGeometry(make_board_with_wide_borders()));
     ASSERT_FALSE(costs.empty());
     auto outlines = tags[0].tone_curve_fits;
     outlines.insert(outlines.begin(),
@@ -273,7 +270,7 @@ TEST(RefineTagsByEdgeFits, ReturnsCornersButNoStepsOfSaturatedEdges) {
 }
 
 // The image is a part of a larger one, which is black outside.
-TEST(RefineTagsByEdgeFits, UsesOnlyPixelsInsideImage) {
+TEST(RefineTags, UsesOnlyPixelsInsideImage) {
   const AnalyticTag tag = make_square(20.2, 40);
   for (const cv::Rect& part : {cv::Rect(18, 0, 80, 80), cv::Rect(0, 18, 80, 80),
                                cv::Rect(0, 0, 63, 80), cv::Rect(0, 0, 80, 63)}) {
@@ -283,7 +280,7 @@ TEST(RefineTagsByEdgeFits, UsesOnlyPixelsInsideImage) {
     render_tags({tag})(part).copyTo(inside);
     auto tags = make_detections({tag});
     for (auto& corner : tags[0].corners_px) corner -= Eigen::Vector2d(part.x, part.y);
-    refine_tags_by_edge_fits(tags, inside, TagGeometry(make_board_with_wide_borders()));
+    refine_tags(tags, inside, TagGeometry(make_board_with_wide_borders()));
     for (std::size_t k = 0; k < 4; ++k) {
       EXPECT_THAT(tags[0].corners_px[k],
                   IsNear(tag.corners_px[k] - Eigen::Vector2d(part.x, part.y), 0.025));
@@ -292,11 +289,11 @@ TEST(RefineTagsByEdgeFits, UsesOnlyPixelsInsideImage) {
   }
 }
 
-TEST(RefineTagsByEdgeFits, KeepsCornersOfTagThatIsNotInImage) {
+TEST(RefineTags, KeepsCornersOfTagThatIsNotInImage) {
   const AnalyticTag tag = make_square(20.2, 40), missing = make_square(80.3, 30);
   auto tags = make_detections({tag, missing});
-  const auto costs = refine_tags_by_edge_fits(tags, render_tags({tag}, {.gamma = 2}),
-                                              TagGeometry(make_board_with_wide_borders()));
+  const auto costs = refine_tags(tags, render_tags({tag}, {.gamma = 2}),
+                                 TagGeometry(make_board_with_wide_borders()));
   EXPECT_EQ(costs.size(), kGammas.size());
   EXPECT_EQ(tags[1].corners_px, missing.corners_px);
   EXPECT_EQ(tags[1].corner_sds_px, TagDetection::CornerSds());
@@ -304,13 +301,12 @@ TEST(RefineTagsByEdgeFits, KeepsCornersOfTagThatIsNotInImage) {
   ASSERT_EQ(tags[1].tone_curve_fits.size(), kGammas.size() - 1);
   EXPECT_EQ(tags[1].tone_curve_fits[2].corners_px, missing.corners_px);
   std::vector<TagDetection> alone{tags[1]};
-  EXPECT_TRUE(refine_tags_by_edge_fits(alone, render_tags({tag}),
-                                       TagGeometry(make_board_with_wide_borders()))
-                  .empty());
+  EXPECT_TRUE(
+      refine_tags(alone, render_tags({tag}), TagGeometry(make_board_with_wide_borders())).empty());
 }
 
 // Tone curves are compared by the eight widest tags.
-TEST(RefineTagsByEdgeFits, FitsAllOfTwelveTagsForEachToneCurve) {
+TEST(RefineTags, FitsAllOfTwelveTagsForEachToneCurve) {
   std::vector<AnalyticTag> drawn;
   for (int i = 0; i < 12; ++i) {
     AnalyticTag tag = make_square(14.2, 36 + 0.5 * i);
@@ -318,9 +314,8 @@ TEST(RefineTagsByEdgeFits, FitsAllOfTwelveTagsForEachToneCurve) {
     drawn.push_back(tag);
   }
   auto tags = make_detections(drawn);
-  const auto costs =
-      refine_tags_by_edge_fits(tags, render_tags(drawn, {.size = {260, 200}, .gamma = 2}),
-                               TagGeometry(make_board_with_wide_borders()));
+  const auto costs = refine_tags(tags, render_tags(drawn, {.size = {260, 200}, .gamma = 2}),
+                                 TagGeometry(make_board_with_wide_borders()));
   EXPECT_EQ(costs.size(), kGammas.size());
   for (std::size_t i = 0; i < tags.size(); ++i) {
     ASSERT_EQ(tags[i].tone_curve_fits.size(), kGammas.size() - 1);

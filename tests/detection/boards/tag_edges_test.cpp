@@ -60,14 +60,13 @@ CornerErrors measure_errors(const Scene& scene, const CaptureSet& views, std::si
   const BoardDetector detector(scene.board->pattern);
   CornerErrors errors;
   for (std::size_t index = 0; index < images; ++index) {
-    const BoardShot shot = make_board_capture_parameters(scene, views, index);
+    const BoardShot shot = make_board_shot(scene, views, index);
     std::map<int, TagDetection::Corners> truth;
-    for (const auto& [tag, corner, pixel] :
-         project_scene_corners_into_image(scene, renderer, shot)) {
+    for (const auto& [tag, corner, pixel] : list_true_corners(scene, renderer, shot)) {
       truth[*tag][static_cast<std::size_t>(corner)] = pixel;
     }
-    const cv::Mat image = simulate_sensor_image(
-        scene.sensor, renderer.render_board_in_electrons(shot), index, scene.processing);
+    const cv::Mat image =
+        simulate_sensor_image(scene.sensor, renderer.render_board(shot), index, scene.processing);
     for (const TagDetection& tag : detector.detect_board(image).tags) {
       if (wanted(truth[tag.id])) errors.add(tag.corners_px, truth[tag.id]);
     }
@@ -116,9 +115,8 @@ TEST(BoardDetector, MeasuresCurvaturesOfStraightEdgesBehindDistortingLens) {
   double squared_errors = 0, squared_offsets = 0;
   for (std::size_t index = 0; index < 3; ++index) {
     const cv::Mat image = simulate_sensor_image(
-        scene.sensor,
-        renderer.render_board_in_electrons(make_board_capture_parameters(scene, views, index)),
-        index, scene.processing);
+        scene.sensor, renderer.render_board(make_board_shot(scene, views, index)), index,
+        scene.processing);
     for (const TagDetection& tag : detector.detect_board(image).tags) {
       const auto& corners = tag.corners_px;
       const Eigen::Vector2d middle = (corners[0] + corners[1] + corners[2] + corners[3]) / 4;
@@ -129,8 +127,7 @@ TEST(BoardDetector, MeasuresCurvaturesOfStraightEdgesBehindDistortingLens) {
         outwards.normalize();
         const Eigen::Vector3d expected_px = compute_offsets_from_chord_px(lens, from, to, outwards);
         for (Eigen::Index i = 0; i < 3; ++i) {
-          const double measured_px =
-              tag.curvatures[k].curve_offset_from_straight_line_px(0.5 * double(i - 1));
+          const double measured_px = tag.curvatures[k].curve_offset_px(0.5 * double(i - 1));
           squared_errors += std::pow(measured_px - expected_px[i], 2) / 3;
           squared_offsets += expected_px.squaredNorm() / 9;
         }
@@ -152,9 +149,8 @@ TEST(BoardDetector, MeasuresCurvaturesOfStraightEdgesBehindDistortingLens) {
 /// Renders the first board view of a scene.
 cv::Mat render_first_board_view(const Scene& scene) {
   const FrameRenderer renderer(scene);
-  const BoardShot shot = make_board_capture_parameters(scene, find_board_set(scene), 0);
-  return simulate_sensor_image(scene.sensor, renderer.render_board_in_electrons(shot), 1,
-                               scene.processing);
+  const BoardShot shot = make_board_shot(scene, find_board_set(scene), 0);
+  return simulate_sensor_image(scene.sensor, renderer.render_board(shot), 1, scene.processing);
 }
 
 TEST(BoardDetector, ListsFitForEachToneCurveOfImageWithGamma) {
@@ -217,7 +213,7 @@ struct DrawnTag {
     tags[0].id = kId;
     tags[0].corners_px = corners_px;
     tags[0].corners_px[0] += displacement_px;
-    refine_tags_by_edge_fits(tags, image, TagGeometry(board));
+    refine_tags(tags, image, TagGeometry(board));
     return tags[0].corners_px[0];
   }
 
@@ -226,7 +222,7 @@ struct DrawnTag {
   TagDetection::Corners corners_px;
 };
 
-TEST(RefineTagsByEdgeFits, LimitsDisplacementToLargerOf1p5PxAnd3PercentOfWidth) {
+TEST(RefineTags, LimitsDisplacementToLargerOf1p5PxAnd3PercentOfWidth) {
   for (const int bit_px : {4, 12}) {
     SCOPED_TRACE(bit_px);
     const DrawnTag tag(bit_px);

@@ -33,16 +33,16 @@ TEST(TagGeometry, WhiteBitSegmentsMatchImagesOfLibapriltag) {
     const TagGeometry print(board);
     const TagFamily drawn = make_tag_family(family);
     const int width = drawn->width_at_border, margin = (drawn->total_width - width) / 2;
-    EXPECT_EQ(print.width_of_tag_with_border_bits(), width);
-    EXPECT_EQ(print.stripe_width_inside_tag_edge_bits(), 1);
-    EXPECT_EQ(print.stripe_width_outside_tag_edge_bits(), 0.5 * width);
+    EXPECT_EQ(print.width_bits(), width);
+    EXPECT_EQ(print.inner_stripe_bits(), 1);
+    EXPECT_EQ(print.outer_stripe_bits(), 0.5 * width);
     for (const int id : {0, 5, 17}) {
       const std::unique_ptr<image_u8_t, void (*)(image_u8_t*)> picture(
           apriltag_to_image(drawn.get(), id), image_u8_destroy);
       const auto white = [&](int x, int y) {
         return picture->buf[(margin + y) * picture->stride + margin + x] > 0;
       };
-      const TagGeometry::Sides sides = print.find_white_bit_segments_along_tag_edges(id);
+      const TagGeometry::Sides sides = print.list_white_segments(id);
       const int last = width - 1;
       for (int i = 0; i < width; ++i) {
         // Bottom, from the left; right, from the bottom; top, from the right; left, from the top.
@@ -65,12 +65,12 @@ TEST(TagGeometry, ShiftsWhiteBitSegmentsByWidthOfBorder) {
   board.family = "tag36h11";
   board.border_bits = 1;
   board.tag_spacing = 1;
-  const TagGeometry::Sides narrow = TagGeometry(board).find_white_bit_segments_along_tag_edges(3);
+  const TagGeometry::Sides narrow = TagGeometry(board).list_white_segments(3);
   board.border_bits = 2;
   const TagGeometry wide(board);
-  EXPECT_EQ(wide.width_of_tag_with_border_bits(), 10);
-  EXPECT_EQ(wide.stripe_width_inside_tag_edge_bits(), 2);
-  const TagGeometry::Sides sides = wide.find_white_bit_segments_along_tag_edges(3);
+  EXPECT_EQ(wide.width_bits(), 10);
+  EXPECT_EQ(wide.inner_stripe_bits(), 2);
+  const TagGeometry::Sides sides = wide.list_white_segments(3);
   std::size_t segments = 0;
   for (std::size_t k = 0; k < 4; ++k) {
     ASSERT_EQ(sides[k].size(), narrow[k].size());

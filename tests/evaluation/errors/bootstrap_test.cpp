@@ -49,8 +49,7 @@ std::array<int, 4> count_covered(std::size_t stations, std::size_t captures, dou
   Random random(1);
   for (int i = 0; i < 300; ++i) {
     const Errors errors = draw(stations, captures, bias, scatter, random);
-    const ErrorIntervals intervals =
-        bootstrap_error_intervals(errors.values, errors.clusters, 1).value();
+    const ErrorIntervals intervals = bootstrap_intervals(errors.values, errors.clusters, 1).value();
     const auto holds = [](const Interval& interval, double truth) {
       return interval.low <= truth && truth <= interval.high ? 1 : 0;
     };
@@ -64,14 +63,14 @@ std::array<int, 4> count_covered(std::size_t stations, std::size_t captures, dou
 
 /// The expectation of 95 % of 300 cases is 285 with a standard deviation of 4. Percentile intervals
 /// from a hundred clusters are slightly too narrow: 94.5 % in 2,000 cases.
-TEST(BootstrapErrorIntervals, CoversTrueStatisticsAtNominalRate) {
+TEST(BootstrapIntervals, CoversTrueStatisticsAtNominalRate) {
   for (const int count : count_covered(100, 1, 0, 1)) {
     EXPECT_GE(count, 270);
     EXPECT_LE(count, 297);
   }
 }
 
-TEST(BootstrapErrorIntervals, CoversTrueStatisticsAtNominalRateWithBiasPerCluster) {
+TEST(BootstrapIntervals, CoversTrueStatisticsAtNominalRateWithBiasPerCluster) {
   for (const int count : count_covered(100, 3, 1, 0.3)) {
     EXPECT_GE(count, 270);
     EXPECT_LE(count, 297);
@@ -79,23 +78,22 @@ TEST(BootstrapErrorIntervals, CoversTrueStatisticsAtNominalRateWithBiasPerCluste
 }
 
 /// Resampling single captures ignores their common bias, which is why clusters are resampled.
-TEST(BootstrapErrorIntervals, IsNarrowerWhenBiasedCapturesAreResampledSingly) {
+TEST(BootstrapIntervals, IsNarrowerWhenBiasedCapturesAreResampledSingly) {
   Random random(2);
   Errors errors = draw(40, 12, 1, 0.1, random);
-  const Interval together =
-      bootstrap_error_intervals(errors.values, errors.clusters, 1).value().mean;
+  const Interval together = bootstrap_intervals(errors.values, errors.clusters, 1).value().mean;
   std::iota(errors.clusters.begin(), errors.clusters.end(), std::size_t{0});
-  const Interval singly = bootstrap_error_intervals(errors.values, errors.clusters, 1).value().mean;
+  const Interval singly = bootstrap_intervals(errors.values, errors.clusters, 1).value().mean;
   EXPECT_LT(2 * (singly.high - singly.low), together.high - together.low);
 }
 
 /// Theoretical widths for many errors: 2 x 1.96 sd of the mean, and for quantiles sqrt(q (1 - q) /
 /// n) / density. Percentiles of 2,000 resamples of 1,000 groups are accurate to some 5 %.
-TEST(BootstrapErrorIntervals, WidthMatchesTheoryForManyErrors) {
+TEST(BootstrapIntervals, WidthMatchesTheoryForManyErrors) {
   Random random(3);
   const std::size_t count = 50000;
   const Errors errors = draw(count, 1, 0, 1, random);
-  const auto intervals = bootstrap_error_intervals(errors.values, errors.clusters, 2);
+  const auto intervals = bootstrap_intervals(errors.values, errors.clusters, 2);
   ASSERT_TRUE(intervals);
   EXPECT_EQ(intervals->clusters, count);
   const double root = std::sqrt(static_cast<double>(count));
@@ -111,11 +109,11 @@ TEST(BootstrapErrorIntervals, WidthMatchesTheoryForManyErrors) {
   expect_width(intervals->p90.value(), quantile_sd(0.9));
 }
 
-TEST(BootstrapErrorIntervals, ReturnsIdenticalIntervalsForAnyThreadCount) {
+TEST(BootstrapIntervals, ReturnsIdenticalIntervalsForAnyThreadCount) {
   Random random(4);
   const Errors errors = draw(3000, 2, 1, 1, random);
-  const auto one = bootstrap_error_intervals(errors.values, errors.clusters, 1);
-  const auto four = bootstrap_error_intervals(errors.values, errors.clusters, 4);
+  const auto one = bootstrap_intervals(errors.values, errors.clusters, 1);
+  const auto four = bootstrap_intervals(errors.values, errors.clusters, 4);
   ASSERT_TRUE(one && four);
   ASSERT_TRUE(one->p90 && four->p90);
   for (const auto figure : {&ErrorIntervals::mean, &ErrorIntervals::median, &ErrorIntervals::rms}) {
@@ -126,28 +124,27 @@ TEST(BootstrapErrorIntervals, ReturnsIdenticalIntervalsForAnyThreadCount) {
   EXPECT_EQ(one->p90->high, four->p90->high);
 }
 
-TEST(BootstrapErrorIntervals, ReturnsNulloptForFewerThanFiveClusters) {
+TEST(BootstrapIntervals, ReturnsNulloptForFewerThanFiveClusters) {
   const std::vector<double> errors{1, 2, 3, 4, 5, 6};
-  EXPECT_FALSE(bootstrap_error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 1, 2, 3}, 1));
-  const auto intervals =
-      bootstrap_error_intervals(errors, std::vector<std::size_t>{0, 0, 1, 4, 2, 3}, 1);
+  EXPECT_FALSE(bootstrap_intervals(errors, std::vector<std::size_t>{0, 0, 1, 1, 2, 3}, 1));
+  const auto intervals = bootstrap_intervals(errors, std::vector<std::size_t>{0, 0, 1, 4, 2, 3}, 1);
   ASSERT_TRUE(intervals);
   EXPECT_EQ(intervals->clusters, 5);
 }
 
-TEST(BootstrapErrorIntervals, OmitsP90ForTooFewClusters) {
+TEST(BootstrapIntervals, OmitsP90ForTooFewClusters) {
   Random random(5);
   const Errors few = draw(kMinClustersForP90 - 1, 3, 1, 1, random);
-  EXPECT_FALSE(bootstrap_error_intervals(few.values, few.clusters, 1).value().p90);
+  EXPECT_FALSE(bootstrap_intervals(few.values, few.clusters, 1).value().p90);
   const Errors sufficient = draw(kMinClustersForP90, 3, 1, 1, random);
-  EXPECT_TRUE(bootstrap_error_intervals(sufficient.values, sufficient.clusters, 1).value().p90);
+  EXPECT_TRUE(bootstrap_intervals(sufficient.values, sufficient.clusters, 1).value().p90);
 }
 
-TEST(BootstrapErrorIntervals, HasZeroWidthForEqualErrors) {
+TEST(BootstrapIntervals, HasZeroWidthForEqualErrors) {
   const std::vector<double> errors(20, 2.5);
   std::vector<std::size_t> clusters(20);
   std::iota(clusters.begin(), clusters.end(), std::size_t{0});
-  const auto intervals = bootstrap_error_intervals(errors, clusters, 1);
+  const auto intervals = bootstrap_intervals(errors, clusters, 1);
   ASSERT_TRUE(intervals && intervals->p90);
   EXPECT_EQ(intervals->median.low, 2.5);
   EXPECT_EQ(intervals->p90->high, 2.5);

@@ -58,7 +58,7 @@ TEST(CompareFixErrors, ReturnsEquivalentForDifferencesBelowOnePercent) {
   const Pairs tenth = pairs(100, 1e-4);
   EXPECT_EQ(compare_fix_errors(tenth.fixes, tenth.errors, tenth.others, tenth.other_errors, 1)
                 .horizontal()
-                .describe_comparison_result(list_compared_quantities()[0]),
+                .describe_result(list_quantities()[0]),
             "equivalent within 0.15 mm");
   // For small errors the smallest relevant difference is a micrometer.
   Pairs small = pairs(100, 0);
@@ -67,14 +67,14 @@ TEST(CompareFixErrors, ReturnsEquivalentForDifferencesBelowOnePercent) {
   QuantityComparison comparison =
       compare_fix_errors(small.fixes, small.errors, small.others, small.other_errors, 1)
           .horizontal();
-  const ComparedQuantity& horizontal = list_compared_quantities()[0];
-  EXPECT_EQ(comparison.describe_comparison_result(horizontal), "equivalent within 0.001 mm");
+  const ComparedQuantity& horizontal = list_quantities()[0];
+  EXPECT_EQ(comparison.describe_result(horizontal), "equivalent within 0.001 mm");
   ASSERT_TRUE(comparison.interval);
   EXPECT_GT(comparison.interval->low, 0);
   comparison.min_relevant = 1e-7;
-  EXPECT_EQ(comparison.describe_comparison_result(horizontal), "worse by more than 0.0001 mm");
+  EXPECT_EQ(comparison.describe_result(horizontal), "worse by more than 0.0001 mm");
   comparison.clusters = 1;
-  EXPECT_EQ(comparison.describe_comparison_result(horizontal), "inconclusive, too few");
+  EXPECT_EQ(comparison.describe_result(horizontal), "inconclusive, too few");
 }
 
 TEST(CompareFixErrors, ReturnsInconclusiveForFewClustersDespiteManyPairs) {
@@ -172,12 +172,12 @@ TEST(CompareFixErrors, CountsCapturesThatEscapeComparison) {
   EXPECT_EQ(unpaired(), 1U) << "a fix where the others have none is no loss";
 }
 
-TEST(CheckSameImagesInFixes, ThrowsNamingImageMissingInOtherFile) {
+TEST(CheckSameImages, ThrowsNamingImageMissingInOtherFile) {
   const FileRows<FixRow> fixes{"a.csv", {fix_at("a", 0, 0)}};
   const FileRows<FixRow> others{"b.csv", {fix_at("a", 0, 0), fix_at("b", 0, 0)}};
-  EXPECT_THAT(rejection_message([&] { check_same_images_in_fixes(fixes, others); }),
+  EXPECT_THAT(rejection_message([&] { check_same_images(fixes, others); }),
               HasSubstr("b.csv:1: image: 'b' is not in a.csv; 1 of 2"));
-  EXPECT_EQ(rejection_message([&] { check_same_images_in_fixes(fixes, fixes); }), "");
+  EXPECT_EQ(rejection_message([&] { check_same_images(fixes, fixes); }), "");
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace vlp {
 namespace {
 
-TEST(ComputeNormalizedErrors, ReturnsOneIfErrorsMatchReportedSd) {
+TEST(NormalizeErrors, ReturnsOneIfErrorsMatchReportedSd) {
   Random random(1);
   std::vector<FixRow> fixes;
   std::vector<FixError> errors;
@@ -26,7 +26,7 @@ TEST(ComputeNormalizedErrors, ReturnsOneIfErrorsMatchReportedSd) {
                       i,
                       0});
   }
-  const auto ratio = compute_normalized_errors(fixes, errors);
+  const auto ratio = normalize_errors(fixes, errors);
   ASSERT_TRUE(ratio);
   EXPECT_NEAR(ratio->horizontal, 1, 0.015);     // three standard errors
   EXPECT_NEAR(ratio->height.value(), 2, 0.05);  // stated too small by a factor of two
@@ -36,7 +36,7 @@ TEST(ComputeNormalizedErrors, ReturnsOneIfErrorsMatchReportedSd) {
   EXPECT_FALSE(ratio->yaw_within_95);
   fixes.resize(1);
   fixes[0].fix->sd.reset();
-  EXPECT_FALSE(compute_normalized_errors(fixes, {errors[0]}));
+  EXPECT_FALSE(normalize_errors(fixes, {errors[0]}));
 }
 
 /// Four lamps round the origin at a height of 2 m.
@@ -56,15 +56,14 @@ Camera pinhole() {
 
 /// Four lamps round the camera, 2 m above it, and a focal length of 500 px: sd(X) = sd(Y) =
 /// (H / f) noise / sqrt(4), see ErrorBudget::noise.
-TEST(ComputeErrorToCrlbRatio, MatchesClosedFormLimitForFourLamps) {
+TEST(ComputeCrlbRatio, MatchesClosedFormLimitForFourLamps) {
   const double sd_m = 2.0 / 500 * 0.1 / 2, limit_m = sd_m * std::sqrt(2);
   const std::vector<TruthRow> truth{
       {"a", {0, 0}, 0, 0.3}, {"b", {90, 0}, 0, 0}, {"c", {0, 0}, {}, 0}};
-  const auto ratio =
-      compute_error_to_crlb_ratio({{0, {0, 3 * limit_m}, {}, {}, 0, 0},
-                                   {1, {5, 5}, {}, {}, 1, 1},   // sees no lamp
-                                   {2, {5, 5}, {}, {}, 2, 2}},  // at an unknown height
-                                  truth, four_lamps(), pinhole(), 0.1, 2);
+  const auto ratio = compute_crlb_ratio({{0, {0, 3 * limit_m}, {}, {}, 0, 0},
+                                         {1, {5, 5}, {}, {}, 1, 1},   // sees no lamp
+                                         {2, {5, 5}, {}, {}, 2, 2}},  // at an unknown height
+                                        truth, four_lamps(), pinhole(), 0.1, 2);
   ASSERT_TRUE(ratio);
   EXPECT_EQ(ratio->fixes, 1);
   EXPECT_NEAR(ratio->crlb_m, limit_m, 1e-9);
@@ -110,7 +109,7 @@ TEST(CrlbRatio, AreErrorsBelowCrlbIsHardlyEverTrueByChanceForUnequalLimits) {
       const double x_m = sd_m * random.normal(), y_m = sd_m * random.normal();
       errors.push_back({i, {x_m, y_m}, {}, {}, i, i});
     }
-    const auto ratio = compute_error_to_crlb_ratio(errors, truth, lamps, camera, 0.1, 1);
+    const auto ratio = compute_crlb_ratio(errors, truth, lamps, camera, 0.1, 1);
     ASSERT_TRUE(ratio);
     sd = ratio->sd;
     square += std::pow(ratio->horizontal - 1, 2) / trials;

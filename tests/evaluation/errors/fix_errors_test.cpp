@@ -13,14 +13,14 @@ namespace {
 
 using testing::HasSubstr;
 
-TEST(ComputeFixErrorsAgainstTruth, PairsFixesAndTruthByImageName) {
+TEST(CompareWithTruth, PairsFixesAndTruthByImageName) {
   const FileRows<FixRow> fixes{
       "fixes.csv",
       {fix_at("b", 1.003, 2.004, 0.5, 3.1), no_fix("c", "degenerate"), fix_at("a", 0, 0, 0.1)}};
   const FileRows<TruthRow> truth{
       "truth.csv",
       {{"a", {0, 0}, 0, 0}, {"b", {1, 2}, 0.4, -3.1}, {"c", {0, 0}, 0, 0}, {"d", {0, 0}, 0, 0}}};
-  const FixErrors errors = compute_fix_errors_against_truth(fixes, truth, 1e-3);
+  const FixErrors errors = compare_with_truth(fixes, truth, 1e-3);
   EXPECT_EQ(errors.captures, 4);
   EXPECT_EQ(errors.failures_by_status,
             (std::map<std::string, std::size_t>{{"degenerate", 1}, {"no row", 1}}));
@@ -32,17 +32,16 @@ TEST(ComputeFixErrorsAgainstTruth, PairsFixesAndTruthByImageName) {
   EXPECT_EQ(errors.errors[1].cluster, 0);
 }
 
-TEST(ComputeFixErrorsAgainstTruth, ThrowsForFixesOfImagesMissingInTruth) {
+TEST(CompareWithTruth, ThrowsForFixesOfImagesMissingInTruth) {
   FileRows<FixRow> fixes{"fixes.csv", {fix_at("a", 0, 0), fix_at("x", 0, 0), fix_at("y", 0, 0)}};
   fixes.rows[1].line = 17;
   const FileRows<TruthRow> truth{"truth.csv", {{"a", {0, 0}, {}, {}}}};
-  const std::string refusal =
-      rejection_message([&] { compute_fix_errors_against_truth(fixes, truth, 1e-3); });
+  const std::string refusal = rejection_message([&] { compare_with_truth(fixes, truth, 1e-3); });
   EXPECT_THAT(refusal, HasSubstr("fixes.csv:17: image: 'x' is not in truth.csv"));
   EXPECT_THAT(refusal, HasSubstr("2 of 3"));
 }
 
-TEST(ComputeFixErrorsAgainstTruth, NamesColumnAndUnitThatAgreeWithFixes) {
+TEST(CompareWithTruth, NamesColumnAndUnitThatAgreeWithFixes) {
   const FileRows<FixRow> fixes{
       "fixes.csv",
       {fix_at("a", 1, 2, 1.5, 1), fix_at("b", -2, 1, 1.4, -0.5), fix_at("c", 3, -1, 1.6, 0.8)}};
@@ -54,7 +53,7 @@ TEST(ComputeFixErrorsAgainstTruth, NamesColumnAndUnitThatAgreeWithFixes) {
                             units_per_z_m * (pose.position_m.z() + 0.01),
                             units_per_rad * (pose.yaw_rad + 0.01), 2});
     }
-    return rejection_message([&] { compute_fix_errors_against_truth(fixes, truth, 1e-3); });
+    return rejection_message([&] { compare_with_truth(fixes, truth, 1e-3); });
   };
   EXPECT_EQ(refusal(1, 1, 1), "");
   EXPECT_EQ(refusal(7, 1, 1), "") << "wrong, but not by a unit";
@@ -69,9 +68,9 @@ TEST(ComputeFixErrorsAgainstTruth, NamesColumnAndUnitThatAgreeWithFixes) {
                                                  "are in degrees; convert them to rad"));
 }
 
-TEST(ComputeFixErrorsAgainstPath, MeasuresErrorsToNearestPointOfPath) {
+TEST(CompareWithPath, MeasuresErrorsToNearestPointOfPath) {
   const Path path{{{0, 0}, {1, 0}, {1, 1}}, {0, 1, 1}};
-  const FixErrors errors = compute_fix_errors_against_path(
+  const FixErrors errors = compare_with_path(
       {fix_at("a", 0.5, 0.1, 0.7), fix_at("b", -3, -4), fix_at("c", 1.2, 0.5), no_fix("d", "x")},
       path);
   EXPECT_EQ(errors.captures, 4);
@@ -83,9 +82,9 @@ TEST(ComputeFixErrorsAgainstPath, MeasuresErrorsToNearestPointOfPath) {
   EXPECT_FALSE(errors.errors[2].yaw_rad);
 }
 
-TEST(ComputeFixErrorsAgainstPath, GroupsConsecutiveFixesIntoThirtyClusters) {
+TEST(CompareWithPath, GroupsConsecutiveFixesIntoThirtyClusters) {
   const std::vector<FixRow> fixes(3000, fix_at("a", 0, 0));
-  const FixErrors errors = compute_fix_errors_against_path(fixes, {{{0, 0}, {1, 0}}, {}});
+  const FixErrors errors = compare_with_path(fixes, {{{0, 0}, {1, 0}}, {}});
   ASSERT_EQ(errors.errors.size(), 3000);
   EXPECT_EQ(errors.errors.front().cluster, 0);
   EXPECT_EQ(errors.errors[99].cluster, 0);

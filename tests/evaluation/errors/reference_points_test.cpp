@@ -9,17 +9,16 @@
 namespace vlp {
 namespace {
 
-TEST(AssignPositionsToReferencePoints, GroupsPositionsWithinRadiusOfFirst) {
+TEST(GroupPositions, GroupsPositionsWithinRadiusOfFirst) {
   const std::vector<Eigen::Vector3d> places_m{
       {0, 0, 0},         {0.0009, 0, 0}, {0.0018, 0, 0},  // 0.9 mm from the second, not the first
       {0, 0, 0.0015},    {0, 0, 0.0006}, {-0.0005, -0.0005, -0.0005},
       {0.0018, 0.001, 0}};
-  EXPECT_EQ(assign_positions_to_reference_points(places_m, 1e-3),
-            (std::vector<std::size_t>{0, 0, 1, 2, 0, 0, 1}));
+  EXPECT_EQ(group_positions(places_m, 1e-3), (std::vector<std::size_t>{0, 0, 1, 2, 0, 0, 1}));
 }
 
 /// Compares with the definition, for cells on all sides of the origin.
-TEST(AssignPositionsToReferencePoints, MatchesLinearSearchOverFirstPositions) {
+TEST(GroupPositions, MatchesLinearSearchOverFirstPositions) {
   Random random(1);
   std::vector<Eigen::Vector3d> places_m;
   for (int i = 0; i < 2000; ++i) {
@@ -33,7 +32,7 @@ TEST(AssignPositionsToReferencePoints, MatchesLinearSearchOverFirstPositions) {
     if (station == firsts_m.size()) firsts_m.push_back(place_m);
     expected.push_back(station);
   }
-  EXPECT_EQ(assign_positions_to_reference_points(places_m, 0.5), expected);
+  EXPECT_EQ(group_positions(places_m, 0.5), expected);
 }
 
 }  // namespace

@@ -40,8 +40,7 @@ std::vector<std::string> describe(const std::function<void(TruthRow&)>& change,
     truth.rows[static_cast<std::size_t>(i)].xy_m =
         places_m[static_cast<std::size_t>((i + count + shift) % count)];
   }
-  return describe_systematic_errors(fixes, truth,
-                                    compute_fix_errors_against_truth(fixes, truth, 1e-3).errors);
+  return describe_systematic_errors(fixes, truth, compare_with_truth(fixes, truth, 1e-3).errors);
 }
 
 TEST(DescribeSystematicErrors, ReturnsNoneForNoiseFewFixesAndRandomErrors) {
@@ -78,8 +77,8 @@ TEST(DescribeSystematicErrors, NamesShiftedRowsOfPairsAtOnePosition) {
     const int other = (i + 1) % 12;
     truth.rows.push_back({image, {0.3 * (other / 2), 0.1 * (other / 4)}, {}, {}});
   }
-  const auto found = describe_systematic_errors(
-      fixes, truth, compute_fix_errors_against_truth(fixes, truth, 1e-3).errors);
+  const auto found =
+      describe_systematic_errors(fixes, truth, compare_with_truth(fixes, truth, 1e-3).errors);
   EXPECT_THAT(found, ElementsAre(HasSubstr("those of the previous row")));
 }
 
@@ -99,7 +98,7 @@ TEST(DescribeSystematicErrors, ReturnsNoneForFixesAtOnePlace) {
     fixes.rows.push_back(fix_at(std::to_string(i), 1e-3 * (i % 3), 1e-3 * (i % 2)));
     truth.rows.push_back({std::to_string(i), {0.3 * (i % 4), 0.25 * (i / 4)}, {}, {}});
   }
-  const auto errors = compute_fix_errors_against_truth(fixes, truth, 1e-3).errors;
+  const auto errors = compare_with_truth(fixes, truth, 1e-3).errors;
   EXPECT_THAT(describe_systematic_errors(fixes, truth, errors), IsEmpty());
 }
 

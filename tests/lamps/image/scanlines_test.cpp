@@ -23,7 +23,7 @@ TEST(LightDetector, DetectsSameLightsInTransposedImageWithColumnReadout) {
   scene.sensor.shot_noise = false;
   scene.sensor.read_noise_e = 0;
   const FrameRenderer renderer(scene);
-  const LampMap map = make_scene_lamp_map(scene, false);
+  const LampMap map = make_lamp_map(scene, false);
   const double row_time_s = *scene.camera.row_time_s;
   const LightDetector by_rows(map, {Readout::rows, row_time_s, std::nullopt});
   const LightDetector by_columns(map, {Readout::columns, row_time_s, std::nullopt});
@@ -31,9 +31,9 @@ TEST(LightDetector, DetectsSameLightsInTransposedImageWithColumnReadout) {
       *std::find_if(scene.sets.begin(), scene.sets.end(),
                     [](const CaptureSet& any) { return any.folder == "check"; });
   for (std::size_t i = 0; i < 3; ++i) {
-    const LampShot shot = make_lamp_capture_parameters(scene, set, i * 7);
-    const cv::Mat image = simulate_sensor_image(
-        scene.sensor, renderer.render_lamps_in_electrons(shot), shot.noise_seed);
+    const LampShot shot = make_lamp_shot(scene, set, i * 7);
+    const cv::Mat image =
+        simulate_sensor_image(scene.sensor, renderer.render_lamps(shot), shot.noise_seed);
     const auto upright = by_rows.detect_lights(to_image_view(image));
     auto turned = by_columns.detect_lights(to_image_view(image.t()));
     std::sort(turned.begin(), turned.end(), before);

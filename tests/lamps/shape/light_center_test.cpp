@@ -24,7 +24,7 @@ using Eigen::Vector2d;
 class LightShapeOfMovingDisc : public testing::Test {
  protected:
   LightShapeOfMovingDisc()
-      : shape(camera), center_px(shape.pixel_from_level_plane_point(circle.center).value()) {}
+      : shape(camera), center_px(shape.pixel_from_plane(circle.center).value()) {}
 
   /// Returns the rim with each point at its position when its scanline is read: at d + m (l - l_c).
   std::vector<Vector2d> outline(const Vector2d& motion_per_line) const {
@@ -34,11 +34,9 @@ class LightShapeOfMovingDisc : public testing::Test {
       const double angle = 2 * std::numbers::pi * i / count;
       const Vector2d rim =
           circle.center + circle.radius * Vector2d(std::cos(angle), std::sin(angle));
-      Vector2d pixel = shape.pixel_from_level_plane_point(rim).value();
+      Vector2d pixel = shape.pixel_from_plane(rim).value();
       for (int iteration = 0; iteration < 20; ++iteration) {
-        pixel =
-            shape.pixel_from_level_plane_point(rim + (pixel.y() - center_px.y()) * motion_per_line)
-                .value();
+        pixel = shape.pixel_from_plane(rim + (pixel.y() - center_px.y()) * motion_per_line).value();
       }
       points.push_back(pixel);
     }
@@ -49,15 +47,14 @@ class LightShapeOfMovingDisc : public testing::Test {
   std::optional<MeasuredLight> fit_light(const Vector2d& motion_per_line) const {
     std::vector<Vector2d> in_plane;
     for (const Vector2d& pixel : outline(motion_per_line))
-      in_plane.push_back(shape.level_plane_point_from_pixel(pixel).value());
+      in_plane.push_back(shape.plane_from_pixel(pixel).value());
     const auto fit = fit_circle(in_plane);
     MeasuredLight light{};
-    if (!fit ||
-        !shape.set_outline_of_light({fit->circle.center, Matrix2::Identity() / fit->circle.radius},
-                                    600 * fit->circle.radius, light))
+    if (!fit || !shape.set_outline({fit->circle.center, Matrix2::Identity() / fit->circle.radius},
+                                   600 * fit->circle.radius, light))
       return std::nullopt;
     light.outline_equations = make_outline_equations(
-        in_plane, fit->circle, shape.compute_scanline_gradient_wrt_position(fit->circle), 1e-3);
+        in_plane, fit->circle, shape.compute_scanline_gradient(fit->circle), 1e-3);
     return light;
   }
 
@@ -76,9 +73,8 @@ TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRo
     ASSERT_TRUE(light);
     const Vector2d oval = complex_product(light->outline_equations->scanline_gradient, motion) / 2;
     MeasuredLight unshifted = *light;
-    shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
-    shape.correct_light_for_motion({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),
-                                   unshifted);
+    shape.correct_light({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
+    shape.correct_light({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), unshifted);
     EXPECT_THAT(light->pixel, IsNear(center_px, 2e-3));
     EXPECT_GT((unshifted.pixel - center_px).norm(), 8e-3) << "read sooner than its center";
   }
@@ -87,8 +83,7 @@ TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRo
 TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesTrueCenterForStationaryCamera) {
   auto light = fit_light(Vector2d::Zero());
   ASSERT_TRUE(light);
-  shape.correct_light_for_motion({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),
-                                 *light);
+  shape.correct_light({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), *light);
   EXPECT_THAT(light->pixel, IsNear(center_px, 1e-6));
 }
 

@@ -22,7 +22,7 @@ using Eigen::Vector2d;
 const cv::Size kSize(300, 280);
 
 Blob largest_blob(const ImageView& image, const Background& background) {
-  const auto blobs = group_pixel_runs_into_blobs(find_pixel_runs(image, background.threshold), 24);
+  const auto blobs = group_into_blobs(list_pixel_runs(image, background.threshold), 24);
   if (blobs.empty()) throw std::runtime_error("the image has no blob");
   return *std::max_element(blobs.begin(), blobs.end(), [](const Blob& a, const Blob& b) {
     return a.blob_bounding_box().area_px() < b.blob_bounding_box().area_px();
@@ -33,7 +33,7 @@ Blob largest_blob(const ImageView& image, const Background& background) {
 std::optional<MeasuredLight> rim_in(const cv::Mat& pixels, double period_lines,
                                     const std::optional<KnownRadius>& radius = {}) {
   const ImageView image = to_image_view(pixels);
-  const Background background = estimate_image_background(image);
+  const Background background = estimate_background_of(image);
   return fit_rim_of_light(image, largest_blob(image, background), period_lines, background,
                           LightShape(drawn_camera(pixels.size())), radius);
 }

@@ -58,16 +58,16 @@ TEST(Shear, PredictedOvalMatchesMotionOfTranslatingAndRotatingCamera) {
   Random random(1);
   const MovingCamera moving_camera;
   const auto lights = three_whole(moving_camera, random);
-  const auto shear = Shear::estimate_shear_from_outlines(lights);
+  const auto shear = Shear::estimate_shear(lights);
   ASSERT_TRUE(shear);
   const Vector2d at(-0.3, -0.3);
-  const Oval oval = shear->predict_oval_from_motion(moving_camera.make_outline(at, 2 * pi, random));
+  const Oval oval = shear->predict_oval(moving_camera.make_outline(at, 2 * pi, random));
   // With s along y alone, s (v_x + i v_y) / 2 is |s| (-v_y + i v_x) / 2.
   const Vector2d motion = moving_camera.motion_at(at),
                  expected = 300 * Vector2d(-motion.y(), motion.x());
   EXPECT_GT(expected.norm(), 0.005);
   EXPECT_THAT(oval.oval, IsNear(expected, 3e-4));
-  EXPECT_THAT(shear->motion_per_scanline(moving_camera.make_outline(at, 2 * pi, random)),
+  EXPECT_THAT(shear->motion_per_line(moving_camera.make_outline(at, 2 * pi, random)),
               IsNear(motion, 1e-6));
 }
 
@@ -81,9 +81,9 @@ TEST(Shear, ReducesCenterErrorOfPartialOutline) {
     auto lights = three_whole(moving_camera, random);
     lights.push_back(moving_camera.make_outline(center, 1.1 * pi, random));
     const OutlineEquations& part = lights.back();
-    const auto shear = Shear::estimate_shear_from_outlines(lights);
+    const auto shear = Shear::estimate_shear(lights);
     ASSERT_TRUE(shear);
-    const auto found = part.solve_with_oval_prior(shear->predict_oval_from_motion(part));
+    const auto found = part.solve_with_oval_prior(shear->predict_oval(part));
     ASSERT_TRUE(found);
     const Vector2d by_circle = part.circle.center - center;
     const Vector2d error = (by_circle + kRadius * found->p.head<2>()) / kRadius;
@@ -105,10 +105,10 @@ TEST(Shear, EstimateIgnoresLightWithContradictingMotion) {
   MovingCamera other;
   other.v = -3 * moving_camera.v;
   lights.push_back(other.make_outline({0.4, -0.3}, 2 * pi, random));
-  const auto shear = Shear::estimate_shear_from_outlines(lights);
+  const auto shear = Shear::estimate_shear(lights);
   ASSERT_TRUE(shear);
   const Vector2d motion = moving_camera.motion_at({-0.4, 0.2});
-  EXPECT_THAT(shear->predict_oval_from_motion(lights[1]).oval,
+  EXPECT_THAT(shear->predict_oval(lights[1]).oval,
               IsNear(300 * Vector2d(-motion.y(), motion.x()), 5e-4));
 }
 

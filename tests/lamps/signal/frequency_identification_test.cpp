@@ -24,10 +24,10 @@ Stripes stripes(double frequency_hz, double duty = 0.5) {
 }
 
 std::optional<int> identified(const std::vector<Lamp>& lamps, const Stripes& stripes) {
-  return identify_lamp_by_frequency({lamps}, kRowTime_s, stripes);
+  return identify_by_frequency({lamps}, kRowTime_s, stripes);
 }
 
-TEST(IdentifyLampByFrequency, ReturnsLampOnlyWithinToleranceOfItsFrequency) {
+TEST(IdentifyByFrequency, ReturnsLampOnlyWithinToleranceOfItsFrequency) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000), rule_lamp(2, 2500)};
   EXPECT_EQ(identified(lamps, stripes(2000)), 1);
   EXPECT_EQ(identified(lamps, stripes(2080)), 1);
@@ -36,7 +36,7 @@ TEST(IdentifyLampByFrequency, ReturnsLampOnlyWithinToleranceOfItsFrequency) {
   EXPECT_EQ(identified(lamps, stripes(3000)), std::nullopt) << "like neither";
 }
 
-TEST(IdentifyLampByFrequency, AllowsLessDeviationForFewOrUnclearStripes) {
+TEST(IdentifyByFrequency, AllowsLessDeviationForFewOrUnclearStripes) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes few = stripes(2080), unclear = few;
   few.periods = 2;
@@ -47,7 +47,7 @@ TEST(IdentifyLampByFrequency, AllowsLessDeviationForFewOrUnclearStripes) {
   EXPECT_EQ(identified(lamps, few), 1);
 }
 
-TEST(IdentifyLampByFrequency, ReturnsNulloptForUnclearIrregularStripes) {
+TEST(IdentifyByFrequency, ReturnsNulloptForUnclearIrregularStripes) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000)};
   Stripes unclear = stripes(2000);
   unclear.periodicity_r2 = 0.6;
@@ -57,7 +57,7 @@ TEST(IdentifyLampByFrequency, ReturnsNulloptForUnclearIrregularStripes) {
   EXPECT_EQ(identified(lamps, unclear), 1);
 }
 
-TEST(IdentifyLampByFrequency, SeparatesLampsOfEqualFrequencyByDuty) {
+TEST(IdentifyByFrequency, SeparatesLampsOfEqualFrequencyByDuty) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000, 0.3), rule_lamp(2, 2010, 0.7)};
   EXPECT_EQ(identified(lamps, stripes(2005, 0.33)), 1);
   EXPECT_EQ(identified(lamps, stripes(2005, 0.64)), 2);
@@ -67,12 +67,12 @@ TEST(IdentifyLampByFrequency, SeparatesLampsOfEqualFrequencyByDuty) {
       << "the other's duty is not known";
 }
 
-TEST(IdentifyLampByFrequency, ReturnsLampByFrequencyEvenIfDutyContradicts) {
+TEST(IdentifyByFrequency, ReturnsLampByFrequencyEvenIfDutyContradicts) {
   const std::vector<Lamp> lamps{rule_lamp(1, 2000, 0.3), rule_lamp(2, 2500, 0.7)};
   EXPECT_EQ(identified(lamps, stripes(2000, 0.7)), 1);
 }
 
-TEST(IdentifyLampByFrequency, ReturnsNulloptWithoutPeriodOrFrequency) {
+TEST(IdentifyByFrequency, ReturnsNulloptWithoutPeriodOrFrequency) {
   EXPECT_EQ(identified({rule_lamp(1, 2000)}, Stripes{}), std::nullopt);
   EXPECT_EQ(identified({{1, {0, 0, 2}, {}, {}, {}}}, stripes(2000)), std::nullopt);
 }

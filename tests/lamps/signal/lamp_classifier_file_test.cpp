@@ -22,9 +22,9 @@ LampClassifier sample() {
   return classifier;
 }
 
-TEST(LampClassifierFile, ReadReturnsWrittenClassifier) {
+TEST(ClassifierPath, ReadReturnsWrittenClassifier) {
   const TemporaryFolder folder;
-  write_lamp_classifier(folder / "a.yaml", sample());
+  write_classifier(folder / "a.yaml", sample());
   const LampClassifier read = read_lamp_classifier(folder / "a.yaml");
   EXPECT_EQ(read.mean, sample().mean);
   EXPECT_EQ(read.scale, sample().scale);
@@ -34,14 +34,14 @@ TEST(LampClassifierFile, ReadReturnsWrittenClassifier) {
   EXPECT_EQ(read.lamps[1].examples, 60);
   EXPECT_EQ(read.lamps[1].center, sample().lamps[1].center);
   EXPECT_EQ(read.row_time_s, 3e-5);
-  write_lamp_classifier(folder / "b.yaml", read);
+  write_classifier(folder / "b.yaml", read);
   EXPECT_EQ(TemporaryFolder::read_content(folder / "a.yaml"),
             TemporaryFolder::read_content(folder / "b.yaml"));
 }
 
 TEST(ReadLampClassifier, ThrowsForInvalidFile) {
   const TemporaryFolder folder;
-  write_lamp_classifier(folder / "good.yaml", sample());
+  write_classifier(folder / "good.yaml", sample());
   const std::string valid_yaml = TemporaryFolder::read_content(folder / "good.yaml");
   const auto refusal = [&](const std::string& from, const std::string& to) {
     std::string yaml = valid_yaml;
@@ -66,7 +66,7 @@ TEST(ReadLampClassifier, ThrowsForInvalidFile) {
 
 TEST(ReadLampClassifier, ThrowsForTruncatedFile) {
   const TemporaryFolder folder;
-  write_lamp_classifier(folder / "good.yaml", sample());
+  write_classifier(folder / "good.yaml", sample());
   const std::string valid_yaml = TemporaryFolder::read_content(folder / "good.yaml");
   for (std::size_t length = 0; length + 1 < valid_yaml.size(); ++length) {
     const auto file = folder.file("cut.yaml", valid_yaml.substr(0, length));

@@ -17,7 +17,7 @@ Lamp lamp(int id, double frequency_hz, std::optional<double> duty = 0.5) {
   return {id, {double(id), 0, 1.6}, make_disc_lamp_shape(0.18), frequency_hz, duty};
 }
 
-/// Returns the ratio of the RMS error of many measured periods to predict_relative_period_sd().
+/// Returns the ratio of the RMS error of many measured periods to predict_period_sd().
 double measured_over_stated(double period, double lines, double exposure_lines) {
   Random random(5);
   constexpr int draws = 300;
@@ -28,10 +28,10 @@ double measured_over_stated(double period, double lines, double exposure_lines) 
         measure_stripes(noisy_square_wave(used, period, 0.5, exposure_lines, 0.02, random));
     squares += std::pow(stripes.period_lines / period - 1, 2);
   }
-  return std::sqrt(squares / draws) / predict_relative_period_sd(period, lines, exposure_lines);
+  return std::sqrt(squares / draws) / predict_period_sd(period, lines, exposure_lines);
 }
 
-TEST(PredictRelativePeriodSd, CoversErrorsOfMeasuredPeriods) {
+TEST(PredictPeriodSd, CoversErrorsOfMeasuredPeriods) {
   for (const double lines : {40.0, 60.0, 100.0}) {
     for (const double period : {9.3, 20.8}) {
       for (const double exposure_lines : {0.02, 0.5, 1.0, 1.67, 4.0}) {
@@ -45,19 +45,19 @@ TEST(PredictRelativePeriodSd, CoversErrorsOfMeasuredPeriods) {
   }
 }
 
-TEST(CountScanlinesOnLamp, ReturnsScanlinesOrNulloptForUnknownSizeOrLampBelowCamera) {
-  EXPECT_NEAR(count_scanlines_on_lamp(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
+TEST(CountScanlines, ReturnsScanlinesOrNulloptForUnknownSizeOrLampBelowCamera) {
+  EXPECT_NEAR(count_scanlines(lamp(1, 2000), kConditions).value(), 58.5, 1e-9);
   Lamp unknown = lamp(1, 2000);
   unknown.shape.size_m.reset();
-  EXPECT_FALSE(count_scanlines_on_lamp(unknown, kConditions));
+  EXPECT_FALSE(count_scanlines(unknown, kConditions));
   StripeConditions above = kConditions;
   above.camera_height_m = 2;
-  EXPECT_FALSE(count_scanlines_on_lamp(lamp(1, 2000), above));
+  EXPECT_FALSE(count_scanlines(lamp(1, 2000), above));
 }
 
-TEST(FindAmbiguousLamps, ReturnsPairOfLampsWithNearlyEqualFrequencies) {
+TEST(ListAmbiguousLamps, ReturnsPairOfLampsWithNearlyEqualFrequencies) {
   const LampMap map{{lamp(1, 2000), lamp(2, 2500), lamp(3, 2530), lamp(4, 3100)}};
-  const auto pairs = find_ambiguous_lamps(map, kConditions);
+  const auto pairs = list_ambiguous_lamps(map, kConditions);
   ASSERT_EQ(pairs.size(), 1);
   EXPECT_EQ(pairs[0].first, 2);
   EXPECT_EQ(pairs[0].second, 3);
@@ -65,58 +65,56 @@ TEST(FindAmbiguousLamps, ReturnsPairOfLampsWithNearlyEqualFrequencies) {
   EXPECT_GT(pairs[0].required_gap, kLampDrift);
 }
 
-TEST(FindAmbiguousLamps, ReturnsNoneForEqualFrequenciesWithDifferentDuties) {
+TEST(ListAmbiguousLamps, ReturnsNoneForEqualFrequenciesWithDifferentDuties) {
   EXPECT_TRUE(
-      find_ambiguous_lamps({{lamp(2, 2500, 0.3), lamp(3, 2500, 0.7)}}, kConditions).empty());
-  EXPECT_EQ(find_ambiguous_lamps({{lamp(2, 2500, 0.4), lamp(3, 2500, 0.6)}}, kConditions).size(),
+      list_ambiguous_lamps({{lamp(2, 2500, 0.3), lamp(3, 2500, 0.7)}}, kConditions).empty());
+  EXPECT_EQ(list_ambiguous_lamps({{lamp(2, 2500, 0.4), lamp(3, 2500, 0.6)}}, kConditions).size(),
             1);
-  EXPECT_EQ(find_ambiguous_lamps({{lamp(2, 2500, 0.3), lamp(3, 2500, {})}}, kConditions).size(), 1);
+  EXPECT_EQ(list_ambiguous_lamps({{lamp(2, 2500, 0.3), lamp(3, 2500, {})}}, kConditions).size(), 1);
 }
 
-TEST(FindAmbiguousLamps, RequiresLargerDifferenceForFewerLinesOrUnknownExposure) {
+TEST(ListAmbiguousLamps, RequiresLargerDifferenceForFewerLinesOrUnknownExposure) {
   const LampMap map{{lamp(1, 2500), lamp(2, 2560)}};
-  EXPECT_TRUE(find_ambiguous_lamps(map, kConditions).empty());
+  EXPECT_TRUE(list_ambiguous_lamps(map, kConditions).empty());
   StripeConditions sharp = kConditions, far = kConditions;
   sharp.exposure_s.reset();
-  EXPECT_EQ(find_ambiguous_lamps(map, sharp).size(), 1);
+  EXPECT_EQ(list_ambiguous_lamps(map, sharp).size(), 1);
   far.camera_height_m = -1.5;
-  EXPECT_EQ(find_ambiguous_lamps(map, far).size(), 1);
+  EXPECT_EQ(list_ambiguous_lamps(map, far).size(), 1);
 }
 
-TEST(ExplainWhyRoomMustBeChosen, NamesLampsSharingFrequencyAndAllRooms) {
+TEST(ExplainRoomChoice, NamesLampsSharingFrequencyAndAllRooms) {
   LampMapFile lamps{"lamps.yaml", {{lamp(1, 2000), lamp(2, 2500), lamp(7, 2010)}}, {"b", "b", "a"}};
-  const std::string message = explain_why_room_must_be_chosen(lamps, "--room");
+  const std::string message = explain_room_choice(lamps, "--room");
   EXPECT_EQ(
       message,
       "lamps 1 and 7 share a frequency in two rooms: choose a room with --room; the map has: a, b");
   lamps.map.lamps[2].frequency_hz = 3000;
-  EXPECT_EQ(explain_why_room_must_be_chosen(lamps, "--room"), "");
+  EXPECT_EQ(explain_room_choice(lamps, "--room"), "");
 }
 
-TEST(ExplainWhyRoomMustBeChosen, IsEmptyWhenChoosingRoomWouldNotHelp) {
+TEST(ExplainRoomChoice, IsEmptyWhenChoosingRoomWouldNotHelp) {
   const LampMap map{{lamp(1, 2000), lamp(2, 2000)}};
-  EXPECT_EQ(explain_why_room_must_be_chosen({"lamps.yaml", map, {"hall", "hall"}}, "--room"), "");
-  EXPECT_EQ(explain_why_room_must_be_chosen({"lamps.yaml", map, {"", ""}}, "--room"), "");
+  EXPECT_EQ(explain_room_choice({"lamps.yaml", map, {"hall", "hall"}}, "--room"), "");
+  EXPECT_EQ(explain_room_choice({"lamps.yaml", map, {"", ""}}, "--room"), "");
   const LampMap duties{{lamp(1, 2000, 0.3), lamp(2, 2000, 0.7)}};
-  EXPECT_EQ(explain_why_room_must_be_chosen({"lamps.yaml", duties, {"hall", "office"}}, "--room"),
-            "");
+  EXPECT_EQ(explain_room_choice({"lamps.yaml", duties, {"hall", "office"}}, "--room"), "");
 }
 
-TEST(ExplainWhyRoomMustBeChosen, ListsTenRoomsAtMost) {
+TEST(ExplainRoomChoice, ListsTenRoomsAtMost) {
   LampMapFile lamps;
   for (int i = 0; i < 12; ++i) {
     lamps.map.lamps.push_back(lamp(i, 2000));
     lamps.rooms.push_back("r" + std::to_string(10 + i));
   }
-  EXPECT_THAT(explain_why_room_must_be_chosen(lamps, "--room"),
-              testing::EndsWith("r18, r19 and 2 more"));
+  EXPECT_THAT(explain_room_choice(lamps, "--room"), testing::EndsWith("r18, r19 and 2 more"));
 }
 
 /// Nearly all lamps just above the reported limit are identified.
-TEST(FindAmbiguousLamps, ReportedNeededDifferenceSufficesForIdentification) {
+TEST(ListAmbiguousLamps, ReportedNeededDifferenceSufficesForIdentification) {
   StripeConditions conditions = kConditions;
   conditions.exposure_s.reset();
-  const auto pairs = find_ambiguous_lamps({{lamp(1, 2500), lamp(2, 2501)}}, conditions);
+  const auto pairs = list_ambiguous_lamps({{lamp(1, 2500), lamp(2, 2501)}}, conditions);
   ASSERT_EQ(pairs.size(), 1);
   const auto needed = pairs[0].required_gap;
   const LampMap map{{lamp(1, 2500), lamp(2, 2500 * (1 + needed))}};
@@ -125,8 +123,8 @@ TEST(FindAmbiguousLamps, ReportedNeededDifferenceSufficesForIdentification) {
   for (int draw = 0; draw < 400; ++draw) {
     const double period = 1 / (2500 * conditions.row_time_s);
     const auto lines =
-        static_cast<int>(kUsedHeight * count_scanlines_on_lamp(map.lamps[0], conditions).value());
-    const auto id = identify_lamp_by_frequency(
+        static_cast<int>(kUsedHeight * count_scanlines(map.lamps[0], conditions).value());
+    const auto id = identify_by_frequency(
         map, conditions.row_time_s,
         measure_stripes(noisy_square_wave(lines, period, 0.5, 0.02, 0.02, random)));
     right += id == 1;
@@ -136,9 +134,9 @@ TEST(FindAmbiguousLamps, ReportedNeededDifferenceSufficesForIdentification) {
   EXPECT_EQ(wrong, 0);
 }
 
-TEST(FindLampsWithUnreadablePeriod, ReturnsLampsWithTooFewPeriodsOrLowContrast) {
+TEST(ListUnreadableLamps, ReturnsLampsWithTooFewPeriodsOrLowContrast) {
   const LampMap map{{lamp(1, 600), lamp(2, 2500), lamp(3, 19000)}};
-  const auto unreadable = find_lamps_with_unreadable_period(map, kConditions);
+  const auto unreadable = list_unreadable_lamps(map, kConditions);
   ASSERT_EQ(unreadable.size(), 2);
   EXPECT_EQ(unreadable[0].lamp, 1);
   EXPECT_LT(unreadable[0].periods, kMinPeriods);

@@ -22,7 +22,7 @@ constexpr std::array kLampPeriods_lines{9.0, 11.0, 14.5, 18.0, 24.0};
 std::vector<ModulatedLight> find_lights(const cv::Mat& image, std::span<const double> periods) {
   const ImageView view = to_image_view(image);
   const std::array boxes{PixelBox{0, 0, view.width, view.height}};
-  return find_modulated_lights(view, boxes, estimate_image_background(view), periods);
+  return detect_modulated_lights(view, boxes, estimate_background_of(view), periods);
 }
 
 DrawnLamp make_glow(const Eigen::Vector2d& center, double period_lines) {
@@ -31,7 +31,7 @@ DrawnLamp make_glow(const Eigen::Vector2d& center, double period_lines) {
           .glow = DrawnGlow{.fall_px = 18, .core_px = 14}};
 }
 
-TEST(FindModulatedLights, IdentifiesGlowsAndLocatesTheirCenters) {
+TEST(DetectModulatedLights, IdentifiesGlowsAndLocatesTheirCenters) {
   for (std::size_t i = 0; i < kLampPeriods_lines.size(); ++i) {
     for (const int depth : {CV_8U, CV_16U}) {
       const Eigen::Vector2d center(203.3, 131.6);
@@ -47,7 +47,7 @@ TEST(FindModulatedLights, IdentifiesGlowsAndLocatesTheirCenters) {
   }
 }
 
-TEST(FindModulatedLights, ReturnsPeriodWithoutGivenLampPeriods) {
+TEST(DetectModulatedLights, ReturnsPeriodWithoutGivenLampPeriods) {
   const auto lights =
       find_lights(render_lamps({make_glow({203.3, 131.6}, 13)}, kSearchSize, CV_8U, 1), {});
   ASSERT_EQ(lights.size(), 1U);
@@ -55,7 +55,7 @@ TEST(FindModulatedLights, ReturnsPeriodWithoutGivenLampPeriods) {
   EXPECT_NEAR(lights[0].stripes.period_lines, 13, 0.2);
 }
 
-TEST(FindModulatedLights, ReturnsPeriodOfStripWithHardEnds) {
+TEST(DetectModulatedLights, ReturnsPeriodOfStripWithHardEnds) {
   constexpr double period = 21.92;
   for (const double phase : {0.0, 0.25, 0.5, 0.75}) {
     const DrawnStripes stripes{.period_lines = period, .phase = phase};
@@ -71,7 +71,7 @@ TEST(FindModulatedLights, ReturnsPeriodOfStripWithHardEnds) {
   }
 }
 
-TEST(FindModulatedLights, ReportsNoLampForUnknownPeriod) {
+TEST(DetectModulatedLights, ReportsNoLampForUnknownPeriod) {
   for (const double period : {10.0, 12.6, 16.0, 21.0}) {
     const auto lights =
         find_lights(render_lamps({make_glow({203.3, 131.6}, period)}, kSearchSize, CV_8U, 1),
@@ -102,7 +102,7 @@ std::vector<ModulatedLight> find_certain_lights(const cv::Mat& image) {
   return lights;
 }
 
-TEST(FindModulatedLights, ReturnsNoCertainLightsForTiltedBars) {
+TEST(DetectModulatedLights, ReturnsNoCertainLightsForTiltedBars) {
   // Their phase changes by half of a period across the disc, and their mean is still modulated.
   for (const double period : {11.0, 18.0, 24.0}) {
     EXPECT_EQ(find_certain_lights(draw_bars(period, 0)).size(), 1U) << period;
@@ -112,7 +112,7 @@ TEST(FindModulatedLights, ReturnsNoCertainLightsForTiltedBars) {
   }
 }
 
-TEST(FindModulatedLights, CenterSdCoversOffsetOfBrightCore) {
+TEST(DetectModulatedLights, CenterSdCoversOffsetOfBrightCore) {
   double squares = 0;
   int count = 0;
   for (const double angle : {0.3, 1.4, 2.5, 3.6, 4.7, 5.8}) {
@@ -130,7 +130,7 @@ TEST(FindModulatedLights, CenterSdCoversOffsetOfBrightCore) {
   EXPECT_LT(squares / count, 1.5);
 }
 
-TEST(FindModulatedLights, ReturnsNoneForSteadyLightNoiseAndTinyImages) {
+TEST(DetectModulatedLights, ReturnsNoneForSteadyLightNoiseAndTinyImages) {
   const DrawnLamp steady{.center = {203.3, 131.6}, .radius_px = 70, .stripes = {.duty = 1}};
   EXPECT_TRUE(
       find_lights(render_lamps({steady}, kSearchSize, CV_8U, 1), kLampPeriods_lines).empty());

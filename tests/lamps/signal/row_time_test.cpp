@@ -33,12 +33,12 @@ void add(std::vector<MeasuredPeriod>& lights, double frequency_hz, int count, do
 }
 
 RowTimeResult find_row_time(const std::vector<MeasuredPeriod>& lights, const LampMap& map) {
-  return select_row_time_candidate(estimate_row_time_candidates(lights, map));
+  return select_row_time(list_row_time_candidates(lights, map));
 }
 
 const LampMap kMap = make_lamp_map({2000, 2500, 3000, 3500, 4000});
 
-TEST(EstimateRowTimeCandidates, ReturnsExactRowTimeWithoutNoise) {
+TEST(ListRowTimeCandidates, ReturnsExactRowTimeWithoutNoise) {
   Random random(1);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 1, 0, random);
@@ -49,7 +49,7 @@ TEST(EstimateRowTimeCandidates, ReturnsExactRowTimeWithoutNoise) {
   EXPECT_EQ(result.row_time->lights, 5);
 }
 
-TEST(EstimateRowTimeCandidates, IntervalOf95PercentCoversRowTimeForEachNumberOfLamps) {
+TEST(ListRowTimeCandidates, IntervalOf95PercentCoversRowTimeForEachNumberOfLamps) {
   constexpr double frequency_sd = 0.005;
   constexpr int draws = 1000;
   for (const std::size_t count : {2U, 3U, 4U, 5U, 6U}) {
@@ -76,7 +76,7 @@ TEST(EstimateRowTimeCandidates, IntervalOf95PercentCoversRowTimeForEachNumberOfL
   }
 }
 
-TEST(EstimateRowTimeCandidates, RowTimeIsAccurateDespiteLightsMissingInMap) {
+TEST(ListRowTimeCandidates, RowTimeIsAccurateDespiteLightsMissingInMap) {
   Random random(3);
   std::vector<MeasuredPeriod> lights;
   for (const Lamp& lamp : kMap.lamps) add(lights, *lamp.frequency_hz, 20, 0.002, random);
@@ -96,7 +96,7 @@ void expect_ambiguous(const std::vector<double>& seen_hz, const LampMap& map) {
   EXPECT_THAT(result.problem, HasSubstr("add captures with more lamps, or a table"));
 }
 
-TEST(SelectRowTimeCandidate, ReturnsProblemWhenAmbiguous) {
+TEST(SelectRowTime, ReturnsProblemWhenAmbiguous) {
   expect_ambiguous({2500}, kMap);
   // All ratios are equal, and one lamp is not detected.
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
@@ -115,9 +115,9 @@ std::vector<MeasuredPeriod> with_duties(const LampMap& map,
   return lights;
 }
 
-TEST(EstimateRowTimeCandidates, ReturnsBothCandidatesWithTheirLampsWhenAmbiguous) {
+TEST(ListRowTimeCandidates, ReturnsBothCandidatesWithTheirLampsWhenAmbiguous) {
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
-  const auto result = estimate_row_time_candidates(with_duties(even, {1, 2, 3}), even);
+  const auto result = list_row_time_candidates(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(result.groups.size(), 3);
   ASSERT_EQ(result.candidates.size(), 2) << result.problem;
   EXPECT_LE(result.candidates[0].cost, result.candidates[1].cost);
@@ -136,7 +136,7 @@ TEST(EstimateRowTimeCandidates, ReturnsBothCandidatesWithTheirLampsWhenAmbiguous
   }
 }
 
-TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByDifferentDutiesOfAllLamps) {
+TEST(ListRowTimeCandidates, ResolvesAmbiguityByDifferentDutiesOfAllLamps) {
   LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const std::vector duties{0.3, 0.7, 0.4, 0.7};
   for (std::size_t i = 0; i < 4; ++i) even.lamps[i].duty = duties[i];
@@ -154,23 +154,23 @@ TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByDifferentDutiesOfAllLamps) {
   EXPECT_FALSE(find_row_time(with_duties(even, {1, 2, 3}), even).row_time);
 }
 
-TEST(SelectRowTimeCandidate, SelectsCandidateWithClearlyLowerPositionCost) {
+TEST(SelectRowTime, SelectsCandidateWithClearlyLowerPositionCost) {
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
-  const auto found = estimate_row_time_candidates(with_duties(even, {1, 2, 3}), even);
+  const auto found = list_row_time_candidates(with_duties(even, {1, 2, 3}), even);
   ASSERT_EQ(found.candidates.size(), 2);
   for (const std::size_t right : {0U, 1U}) {
     std::vector<double> costs{30, 30};
     costs[right] = 2;
-    const auto result = select_row_time_candidate(found, costs);
+    const auto result = select_row_time(found, costs);
     ASSERT_TRUE(result.row_time) << result.problem;
     EXPECT_EQ(result.row_time->row_time_s, found.candidates[right].row_time.row_time_s);
   }
-  const auto undecided = select_row_time_candidate(found, std::vector<double>{2, 5});
+  const auto undecided = select_row_time(found, std::vector<double>{2, 5});
   EXPECT_FALSE(undecided.row_time);
   EXPECT_THAT(undecided.problem, HasSubstr("fit a row time of"));
 }
 
-TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByLabels) {
+TEST(ListRowTimeCandidates, ResolvesAmbiguityByLabels) {
   const LampMap even = make_lamp_map({1600, 2000, 2500, 3125});
   const std::vector<MeasuredPeriod> lights{{1 / (2000 * kTrue_s), 2}, {1 / (2500 * kTrue_s), 3}};
   const auto result = find_row_time(lights, even);
@@ -178,13 +178,13 @@ TEST(EstimateRowTimeCandidates, ResolvesAmbiguityByLabels) {
   EXPECT_NEAR(result.row_time->row_time_s, kTrue_s, 1e-12);
 }
 
-TEST(GroupLightsByLampOrPeriod, GroupsRepeatedPeriodsAndIgnoresSingleOnes) {
+TEST(GroupLights, GroupsRepeatedPeriodsAndIgnoresSingleOnes) {
   Random random(4);
   std::vector<MeasuredPeriod> lights;
   add(lights, 2000, 40, 0.003, random);
   add(lights, 2500, 30, 0.003, random);
   for (int i = 0; i < 5; ++i) lights.push_back({random.uniform(30, 60), {}});
-  const auto groups = group_lights_by_lamp_or_period(lights);
+  const auto groups = group_lights(lights);
   ASSERT_EQ(groups.size(), 2);
   EXPECT_EQ(groups[0].lights.size(), 40);
   EXPECT_NEAR(std::exp(groups[0].log_period) * 2000 * kTrue_s, 1, 0.002);

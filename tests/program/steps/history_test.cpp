@@ -31,14 +31,14 @@ HistoryEntry make_entry(const std::string& arguments, const std::vector<std::str
   app.add_flag("--refine-map", flag);
   app.add_flag("-q,--quiet", quiet);
   app.parse(arguments);
-  return make_history_entry_from_command_line(app, inputs);
+  return make_command_entry(app, inputs);
 }
 
-TEST(ComputeFileSha256, MatchesFips180Examples) {  // FIPS 180-2, appendix B
+TEST(HashFile, MatchesFips180Examples) {  // FIPS 180-2, appendix B
   const TemporaryFolder folder;
-  EXPECT_EQ(compute_file_sha256(folder.file("abc", "abc")),
+  EXPECT_EQ(hash_file(folder.file("abc", "abc")),
             "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
-  EXPECT_EQ(compute_file_sha256(folder.file("million", std::string(1000000, 'a'))),
+  EXPECT_EQ(hash_file(folder.file("million", std::string(1000000, 'a'))),
             "cdc76e5c9914fb9281a1c7e284d73e67f1809a48a497200e046d39ccc7112cd0");
 }
 
@@ -49,10 +49,10 @@ TEST(InputDigests, ImageFolderDigestMatchesSha256sumOfItsImages) {
   folder.file("notes.txt", "no image");
   const auto oracle =
       run_program("cd '" + (folder / "").string() + "' && sha256sum *.png | sha256sum");
-  EXPECT_EQ(InputDigests().compute_image_folder_digest(folder / ""), oracle.output.substr(0, 64));
+  EXPECT_EQ(InputDigests().digest_images(folder / ""), oracle.output.substr(0, 64));
 }
 
-TEST(MakeHistoryEntryFromCommandLine, OmitsFoldersAndOptionsThatDoNotAffectResult) {
+TEST(MakeCommandEntry, OmitsFoldersAndOptionsThatDoNotAffectResult) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "spot");
   folder.file("spot/0.png", "an image");
@@ -67,12 +67,12 @@ TEST(MakeHistoryEntryFromCommandLine, OmitsFoldersAndOptionsThatDoNotAffectResul
   EXPECT_EQ(entry.options, "--lamps lamps.yaml --method axis --numbers 1.5 -2 --refine-map");
   ASSERT_EQ(entry.inputs.size(), 2U);
   EXPECT_EQ(entry.inputs[0].file, "spot");
-  EXPECT_EQ(entry.inputs[0].sha256, InputDigests().compute_image_folder_digest(images));
+  EXPECT_EQ(entry.inputs[0].sha256, InputDigests().digest_images(images));
   EXPECT_EQ(entry.inputs[1].file, "lamps.yaml");
-  EXPECT_EQ(entry.inputs[1].sha256, compute_file_sha256(lamps));
+  EXPECT_EQ(entry.inputs[1].sha256, hash_file(lamps));
 }
 
-TEST(MakeHistoryEntryFromCommandLine, HasEmptyOptionsWithoutOptionsAndThrowsForUnreadableInput) {
+TEST(MakeCommandEntry, HasEmptyOptionsWithoutOptionsAndThrowsForUnreadableInput) {
   const TemporaryFolder folder;
   EXPECT_EQ(make_entry("images", {}).options, "");
   const std::string missing = (folder / "missing").string();

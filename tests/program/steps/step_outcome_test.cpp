@@ -10,13 +10,13 @@
 namespace vlp {
 namespace {
 
-TEST(ThrowIfStepFailed, ThrowsUndeterminedOnlyForUndeterminedStep) {
+TEST(RequireSuccess, ThrowsUndeterminedOnlyForUndeterminedStep) {
   StepResult result;
-  throw_if_step_failed(result);
+  require_success(result);
   result.set_step_failure(StepFailure::undetermined, "add captures");
-  EXPECT_EQ(rejection_message<Undetermined>([&] { throw_if_step_failed(result); }), "add captures");
+  EXPECT_EQ(rejection_message<Undetermined>([&] { require_success(result); }), "add captures");
   result.set_step_failure(StepFailure::wrong_map, "contradicts the captures", "lamps.yaml");
-  EXPECT_EQ(rejection_message<std::invalid_argument>([&] { throw_if_step_failed(result); }),
+  EXPECT_EQ(rejection_message<std::invalid_argument>([&] { require_success(result); }),
             "lamps.yaml: contradicts the captures");
 }
 

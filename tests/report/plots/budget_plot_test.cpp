@@ -13,9 +13,9 @@ using testing::Not;
 
 TEST(BudgetPlot, StacksBudgetsInOrderOfTotalVariance) {
   const BudgetPlot plot{"a", {"noise", "lens", "it's"}, {{1e-6, 0, 3e-6}, {2e-6, 0, 2.5e-7}}};
-  EXPECT_THAT(plot.compute_variance_contribution_fractions(),
+  EXPECT_THAT(plot.compute_fractions(),
               ElementsAre(testing::DoubleEq(0.48), 0, testing::DoubleEq(0.52)));
-  const Drawing drawing = make_variance_budget_plot_drawing(plot);
+  const Drawing drawing = draw_budget(plot);
   EXPECT_THAT(drawing.commands, HasSubstr("<< END\n2 0 0.25 \n1 0 3 \nEND"));
   EXPECT_THAT(drawing.commands, Not(HasSubstr("lens")));
   const std::string svg = render_plot_as_svg(drawing);
@@ -28,7 +28,7 @@ TEST(BudgetPlot, StacksBudgetsInOrderOfTotalVariance) {
 TEST(BudgetPlot, ThinsManyFixesButKeepsLargest) {
   BudgetPlot plot{"a", {"noise"}, {}};
   for (int i = 5000; i > 0; --i) plot.variances_m2.push_back({1e-6 * i});
-  const std::string commands = make_variance_budget_plot_drawing(plot).commands;
+  const std::string commands = draw_budget(plot).commands;
   EXPECT_THAT(commands, HasSubstr("\n5000 \nEND"));
   EXPECT_THAT(commands, HasSubstr("<< END\n25 \n50 \n"));
 }

@@ -24,7 +24,7 @@ class DispersionPlotTest : public testing::Test {
                       {}};
 
   std::string rendered(const char* name) {
-    write_plot(folder / name, make_dispersion_plot_drawing(plot));
+    write_plot(folder / name, draw_dispersion(plot));
     return TemporaryFolder::read_content(folder / name);
   }
 };
@@ -33,9 +33,8 @@ TEST_F(DispersionPlotTest, RendersReproduciblePngOrSvgByExtension) {
   EXPECT_THAT(rendered("a.png"), StartsWith("\x89PNG"));
   EXPECT_EQ(rendered("a.png"), rendered("a.png"));
   EXPECT_THAT(rendered("a.svg"), HasSubstr("a 'title'"));
-  EXPECT_THAT(
-      rejection_message([&] { write_plot(folder / "a.gif", make_dispersion_plot_drawing(plot)); }),
-      HasSubstr("a.gif: a picture's name should end in"));
+  EXPECT_THAT(rejection_message([&] { write_plot(folder / "a.gif", draw_dispersion(plot)); }),
+              HasSubstr("a.gif: a picture's name should end in"));
 }
 
 TEST_F(DispersionPlotTest, LabelsOutliersOnlyIfThereAreAny) {
@@ -47,9 +46,8 @@ TEST_F(DispersionPlotTest, LabelsOutliersOnlyIfThereAreAny) {
 TEST_F(DispersionPlotTest, RendersSingleFixBeforeAndAfterCorrection) {
   plot.before = {{{0.01, 0}}, {{0.01, 0}, 0}};
   plot.after = {{{0, 0}}, {{0, 0}, 0}};
-  EXPECT_THAT(
-      make_dispersion_plot_drawing(plot).commands,
-      AllOf(HasSubstr("$before << END\n10 0 \nEND\n"), HasSubstr("$after << END\n0 0 \nEND\n")));
+  EXPECT_THAT(draw_dispersion(plot).commands, AllOf(HasSubstr("$before << END\n10 0 \nEND\n"),
+                                                    HasSubstr("$after << END\n0 0 \nEND\n")));
   EXPECT_THAT(rendered("a.svg"), AllOf(HasSubstr("<svg"), HasSubstr("before"), HasSubstr("after"),
                                        HasSubstr("reference point")));
 }

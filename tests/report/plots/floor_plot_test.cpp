@@ -70,8 +70,8 @@ TEST_F(FloorPlotTest, NamesSystemErrorWhenGnuplotScriptCannotBeCreated) {
                                  "Too many open files"));
 }
 
-TEST(QuoteTextForGnuplot, DoublesSingleQuotesAndKeepsOtherCharacters) {
-  EXPECT_EQ(quote_text_for_gnuplot("it's `ls` $x"), "'it''s `ls` $x'");
+TEST(QuoteForGnuplot, DoublesSingleQuotesAndKeepsOtherCharacters) {
+  EXPECT_EQ(quote_for_gnuplot("it's `ls` $x"), "'it''s `ls` $x'");
 }
 
 }  // namespace

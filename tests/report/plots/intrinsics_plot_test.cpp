@@ -23,7 +23,7 @@ class IntrinsicsPlotTest : public testing::Test {
   /// gnuplot's stderr is passed through to the user; it has to be empty.
   std::string render_plot_as_svg(const IntrinsicsPlot& intrinsics_plot) const {
     testing::internal::CaptureStderr();
-    write_plot(folder / "a.svg", make_intrinsics_plot_drawing(intrinsics_plot));
+    write_plot(folder / "a.svg", draw_intrinsics(intrinsics_plot));
     EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
     return TemporaryFolder::read_content(folder / "a.svg");
   }
@@ -51,17 +51,16 @@ TEST_F(IntrinsicsPlotTest, ShowsCornerCountArrowScaleAndSdLevels) {
 }
 
 TEST_F(IntrinsicsPlotTest, RendersReproduciblePngOrSvgByExtension) {
-  write_plot(folder / "a.png", make_intrinsics_plot_drawing(plot));
+  write_plot(folder / "a.png", draw_intrinsics(plot));
   const std::string first = TemporaryFolder::read_content(folder / "a.png");
   EXPECT_THAT(first, StartsWith("\x89PNG"));
-  write_plot(folder / "a.png", make_intrinsics_plot_drawing(plot));
+  write_plot(folder / "a.png", draw_intrinsics(plot));
   EXPECT_EQ(TemporaryFolder::read_content(folder / "a.png"), first);
   const std::string svg = render_plot_as_svg(plot);
   ASSERT_FALSE(svg.empty());
   EXPECT_EQ(render_plot_as_svg(plot), svg);
-  EXPECT_THAT(
-      rejection_message([&] { write_plot(folder / "a.gif", make_intrinsics_plot_drawing(plot)); }),
-      HasSubstr("a.gif: a picture's name should end in .png or .svg"));
+  EXPECT_THAT(rejection_message([&] { write_plot(folder / "a.gif", draw_intrinsics(plot)); }),
+              HasSubstr("a.gif: a picture's name should end in .png or .svg"));
 }
 
 TEST_F(IntrinsicsPlotTest, LeavesUnknownSdsBlankAndStatesWhenAllAreUnknown) {
@@ -69,7 +68,7 @@ TEST_F(IntrinsicsPlotTest, LeavesUnknownSdsBlankAndStatesWhenAllAreUnknown) {
   plot.sd_px[0] = std::numeric_limits<double>::infinity();
   const std::string part = render_plot_as_svg(plot);
   EXPECT_NE(part, whole);
-  EXPECT_THAT(make_intrinsics_plot_drawing(plot).commands, HasSubstr("$map << END\n0 0 NaN\n"));
+  EXPECT_THAT(draw_intrinsics(plot).commands, HasSubstr("$map << END\n0 0 NaN\n"));
   EXPECT_THAT(part, HasSubstr("0.05"));
   plot.sd_px.assign(9, std::nan(""));
   EXPECT_THAT(render_plot_as_svg(plot), AllOf(HasSubstr("not determined"), HasSubstr("2 corners")));
@@ -82,14 +81,14 @@ TEST_F(IntrinsicsPlotTest, RendersConstantSdMapAndZeroResiduals) {
               AllOf(HasSubstr("3 corners"), HasSubstr("1 times as long")));
 }
 
-TEST(ChooseResidualMagnification, ReturnsRoundNumberThatScalesRmsTo1To2Point5PercentOfWidth) {
-  EXPECT_DOUBLE_EQ(choose_residual_magnification(0.1, 800), 200);
-  EXPECT_DOUBLE_EQ(choose_residual_magnification(0.11, 800), 100);
-  EXPECT_DOUBLE_EQ(choose_residual_magnification(1, 4000), 100);
-  EXPECT_DOUBLE_EQ(choose_residual_magnification(40, 800), 0.5);
-  EXPECT_DOUBLE_EQ(choose_residual_magnification(0, 800), 1);
+TEST(ChooseResidualScale, ReturnsRoundNumberThatScalesRmsTo1To2Point5PercentOfWidth) {
+  EXPECT_DOUBLE_EQ(choose_residual_scale(0.1, 800), 200);
+  EXPECT_DOUBLE_EQ(choose_residual_scale(0.11, 800), 100);
+  EXPECT_DOUBLE_EQ(choose_residual_scale(1, 4000), 100);
+  EXPECT_DOUBLE_EQ(choose_residual_scale(40, 800), 0.5);
+  EXPECT_DOUBLE_EQ(choose_residual_scale(0, 800), 1);
   for (const double rms_px : {0.013, 0.05, 0.17, 0.48, 1.3}) {
-    const double length_px = rms_px * choose_residual_magnification(rms_px, 800);
+    const double length_px = rms_px * choose_residual_scale(rms_px, 800);
     EXPECT_LE(length_px, 800 / 40.0);
     EXPECT_GE(length_px, 800 / 100.0);
   }

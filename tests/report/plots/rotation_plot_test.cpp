@@ -19,13 +19,13 @@ TEST(RotationPlot, LabelsLampsRotationCenterAndPrincipalPoint) {
                            {43, {{150, 200}, {250, 200}, {200, 250}}, {201, 199}, {50, 50.5}}},
                           {203, 198},
                           {210, 190}};
-  write_plot(folder / "a.svg", make_rotation_plot_drawing(plot));
+  write_plot(folder / "a.svg", draw_rotation(plot));
   const std::string svg = TemporaryFolder::read_content(folder / "a.svg");
   for (const char* part : {"unit 'seven'", ">42<", ">43<", "principal point", "rotation center"}) {
     EXPECT_THAT(svg, HasSubstr(part));
   }
   EXPECT_THAT(svg, Not(HasSubstr(">44<")));
-  write_plot(folder / "b.svg", make_rotation_plot_drawing(plot));
+  write_plot(folder / "b.svg", draw_rotation(plot));
   EXPECT_EQ(TemporaryFolder::read_content(folder / "b.svg"), svg);
 }
 

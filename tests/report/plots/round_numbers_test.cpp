@@ -11,13 +11,13 @@ using testing::DoubleNear;
 using testing::ElementsAre;
 using testing::Pointwise;
 
-TEST(RoundDownTo125Series, ReturnsOneTwoOrFiveTimesPowerOfTen) {
-  EXPECT_DOUBLE_EQ(round_down_to_1_2_5_series(0.9), 0.5);
-  EXPECT_DOUBLE_EQ(round_down_to_1_2_5_series(1), 1);
-  EXPECT_DOUBLE_EQ(round_down_to_1_2_5_series(1.99), 1);
-  EXPECT_DOUBLE_EQ(round_down_to_1_2_5_series(4.9e5), 2e5);
+TEST(RoundDownTo125, ReturnsOneTwoOrFiveTimesPowerOfTen) {
+  EXPECT_DOUBLE_EQ(round_down_to_1_2_5(0.9), 0.5);
+  EXPECT_DOUBLE_EQ(round_down_to_1_2_5(1), 1);
+  EXPECT_DOUBLE_EQ(round_down_to_1_2_5(1.99), 1);
+  EXPECT_DOUBLE_EQ(round_down_to_1_2_5(4.9e5), 2e5);
   for (const double exact : {1e-6, 2e-3, 0.05, 0.2, 5.0, 1e4}) {
-    EXPECT_DOUBLE_EQ(round_down_to_1_2_5_series(exact), exact);
+    EXPECT_DOUBLE_EQ(round_down_to_1_2_5(exact), exact);
   }
 }
 

@@ -14,7 +14,7 @@ TEST(TrackPlot, DistancesToLeftOfCommandedLineArePositive) {
   // The line runs north; a fix 2 mm to the east is to the right.
   const TrackPlot plot{
       "north", {{{1, 0}, {1, 2}}}, {{1.002, 0.5}, {0.999, 1.5}}, {{{1.001, 0.7}, {1.001, 0.9}}}};
-  const Drawing drawing = make_line_drive_plot_drawing(plot);
+  const Drawing drawing = draw_line_drive(plot);
   EXPECT_THAT(drawing.commands, HasSubstr("1.002 0.5 0.5 -2 \n"));
   EXPECT_THAT(drawing.commands, HasSubstr("0.999 1.5 1.5 1 \n"));
   // The fitted line is drawn from the first fix to the last, not along the whole commanded one.
@@ -28,14 +28,14 @@ TEST(TrackPlot, DistancesToLeftOfCommandedLineArePositive) {
 TEST(TrackPlot, ThinsManyFixesAndStatesStep) {
   TrackPlot plot{"long", {{{0, 0}, {1, 1}}}, {}, {{{0, 0}, {1, 1}}}};
   for (int i = 0; i < 100'000; ++i) plot.fixes_m.emplace_back(1e-5 * i, 1e-5 * i);
-  const Drawing drawing = make_line_drive_plot_drawing(plot);
+  const Drawing drawing = draw_line_drive(plot);
   EXPECT_THAT(drawing.commands, HasSubstr("every 50th of 100000 drawn"));
   EXPECT_LT(render_plot_as_svg(drawing).size(), 700'000u);
 }
 
 TEST(TrackPlot, RendersFixExactlyOnLine) {
   const TrackPlot plot{"", {{{0, 0}, {1, 0}}}, {{0.5, 0}}, {{{0, 0}, {1, 0}}}};
-  const Drawing drawing = make_line_drive_plot_drawing(plot);
+  const Drawing drawing = draw_line_drive(plot);
   EXPECT_THAT(drawing.commands, HasSubstr("$fixes << END\n0.5 0 0.5 0 \nEND\n"));
   EXPECT_THAT(render_plot_as_svg(drawing),
               AllOf(HasSubstr("<svg"), HasSubstr("fixes"), HasSubstr("fitted line")));

@@ -60,8 +60,8 @@ class ArchiveRuns : public testing::Test {
 
   std::vector<RunRecord> runs() const {
     std::vector<RunRecord> all;
-    for (const auto& session : read_reprocessed_archive_sessions(folder / "archive").sessions) {
-      all.push_back(load_run_of_archive_session(session));
+    for (const auto& session : read_reprocessed(folder / "archive").sessions) {
+      all.push_back(load_archive_run(session));
     }
     return all;
   }
@@ -71,7 +71,7 @@ class ArchiveRuns : public testing::Test {
 };
 
 TEST_F(ArchiveRuns, ReturnsDatedSessionsAsRunsInChronologicalOrder) {
-  const auto archive = read_reprocessed_archive_sessions(folder / "archive");
+  const auto archive = read_reprocessed(folder / "archive");
   EXPECT_EQ(archive.undated, 1U);
   EXPECT_EQ(archive.crashed, 1U);
   const auto runs = this->runs();
@@ -82,11 +82,10 @@ TEST_F(ArchiveRuns, ReturnsDatedSessionsAsRunsInChronologicalOrder) {
   EXPECT_THAT((std::vector{runs[0].verdict, runs[1].verdict, runs[2].verdict, runs[3].verdict}),
               ElementsAre("PASS", "PASS", "FAIL", "INVALID"));
   EXPECT_EQ(runs[0].station, "archive");
-  EXPECT_EQ(read_reprocessed_archive_sessions(folder / "archive/").sessions[0].run.station,
-            "archive");
+  EXPECT_EQ(read_reprocessed(folder / "archive/").sessions[0].run.station, "archive");
   EXPECT_EQ(runs[0].config_sha256, "key");
   EXPECT_EQ(runs[1].calibration, "format: vlp-calibration/1\n");
-  EXPECT_EQ(runs[2].first_verdict_cause(), "rms_px is 2 px, at most 1 px is required");
+  EXPECT_EQ(runs[2].first_cause(), "rms_px is 2 px, at most 1 px is required");
   EXPECT_EQ(runs[3].program, "vlp-calibrate 1.2.3");
   ASSERT_THAT(runs[2].metrics, SizeIs(5));
   EXPECT_EQ(runs[2].metrics[0].value, 2);
@@ -111,12 +110,12 @@ TEST_F(ArchiveRuns, StoreRunKeepsOneCopyOfRunsReadTwice) {
               ElementsAre(0.5, 0.5, 0.5));
   EXPECT_EQ(find_gate_limit("rms_px", nullptr, records, load_metric_values(records, "rms_px", {})),
             1);
-  EXPECT_STREQ(find_run_metric_kind("mean_mm").unit, "mm");
-  EXPECT_TRUE(records.check_records_by_audit_trail("").problems.empty());
+  EXPECT_STREQ(require_run_metric_kind("mean_mm").unit, "mm");
+  EXPECT_TRUE(records.check_trail("").problems.empty());
 }
 
 TEST_F(ArchiveRuns, ThrowsForInvalidFilesOfArchive) {
-  EXPECT_THAT(rejection_message([&] { read_reprocessed_archive_sessions(folder / "none"); }),
+  EXPECT_THAT(rejection_message([&] { read_reprocessed(folder / "none"); }),
               HasSubstr("summary.csv: "));
   const std::string in_session = "archive/sessions/a/s1/";
   write(in_session + "session.json", "{\"metrics\": 1}\n");
@@ -134,9 +133,9 @@ TEST_F(ArchiveRuns, ThrowsForInvalidFilesOfArchive) {
 }
 
 TEST_F(ArchiveRuns, SkipsAndListsRowsWithInvalidCameraIds) {
-  const std::size_t before = read_reprocessed_archive_sessions(folder / "archive").sessions.size();
+  const std::size_t before = read_reprocessed(folder / "archive").sessions.size();
   row("..,s1,pass,2026-03-19,,1.2.3,key");
-  const ReprocessedArchive archive = read_reprocessed_archive_sessions(folder / "archive");
+  const ReprocessedArchive archive = read_reprocessed(folder / "archive");
   EXPECT_EQ(archive.sessions.size(), before);
   ASSERT_EQ(archive.rejected_sessions.size(), 1U);
   EXPECT_THAT(archive.rejected_sessions.front(),

@@ -99,15 +99,15 @@ void check_forgeries(const std::function<std::string()>& new_database) {
     const std::string where = new_database();
     keep_three(where);
     Records records(where);
-    const TrailCheck kept = records.check_records_by_audit_trail("");
+    const TrailCheck kept = records.check_trail("");
     EXPECT_THAT(kept.problems, IsEmpty());
     EXPECT_EQ(kept.runs, 3U);
     EXPECT_EQ(kept.entries, 5U);
     run_database_client(where, forgery.sql);
-    EXPECT_EQ(records.check_records_by_audit_trail("").problems, forgery.problems) << forgery.sql;
+    EXPECT_EQ(records.check_trail("").problems, forgery.problems) << forgery.sql;
     if (!forgery.problems.empty()) continue;
     EXPECT_THAT(
-        records.check_records_by_audit_trail(kept.last_digest).problems,
+        records.check_trail(kept.last_digest).problems,
         ElementsAre(StartsWith("the entry that was noted, " + kept.last_digest + ", is not in")));
   }
 }
@@ -124,10 +124,10 @@ TEST(CheckAuditTrail, AcceptsEarlierLastDigestAfterNewRun) {
   const std::string where = (folder / "records.db").string();
   keep_three(where);
   Records records(where);
-  const std::string expected_digest = records.check_records_by_audit_trail("").last_digest;
+  const std::string expected_digest = records.check_trail("").last_digest;
   EXPECT_THAT(expected_digest, SizeIs(64));
   records.store_run(make_sample_record(numbered_run_id(4), "d", 0.5));
-  const TrailCheck later = records.check_records_by_audit_trail(expected_digest);
+  const TrailCheck later = records.check_trail(expected_digest);
   EXPECT_THAT(later.problems, IsEmpty());
   EXPECT_EQ(later.entries, 6U);
   EXPECT_NE(later.last_digest, expected_digest);
@@ -142,8 +142,8 @@ TEST(CheckAuditTrail, ReturnsSameDigestForPostgresAndSqlite) {
   const std::string file = (folder / "records.db").string();
   keep_three(file);
   keep_three(server.uri());
-  EXPECT_EQ(Records(file).check_records_by_audit_trail("").last_digest,
-            Records(server.uri()).check_records_by_audit_trail("").last_digest);
+  EXPECT_EQ(Records(file).check_trail("").last_digest,
+            Records(server.uri()).check_trail("").last_digest);
 }
 
 }  // namespace

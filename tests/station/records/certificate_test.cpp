@@ -53,15 +53,15 @@ RunRecord certified_run() {
   record.config_sha256 = std::string(64, 'a');
   record.calibration = "format: vlp-calibration/1\n";
   record.verdict = verdict_name(Verdict::pass);
-  record.metrics = check_all_metrics_against_gates(
+  record.metrics = check_against_gates(
       {{"rms_px", 0.3}, {"check_mean_mm", 1, GuardBand{0.02, 1.645}}},
-      {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, list_unit_metric_kinds());
+      {{"rms_px", 0.123456}, {"check_mean_mm", 0.9600001}}, list_unit_metrics());
   return record;
 }
 
-TEST(FormatCertifiedValue, StatesTwiceTheSdWithTwoDigits) {
+TEST(FormatValueWithExpandedUncertainty, StatesTwiceTheSdWithTwoDigits) {
   const auto words = [](double value, std::optional<double> u) {
-    return format_certified_value(CertifiedValue{"", "px", value, u});
+    return format_value_with_expanded_uncertainty(CertifiedValue{"", "px", value, u});
   };
   EXPECT_EQ(words(520.12345, 0.006), "520.123 \u00b1 0.012\u00a0px");
   EXPECT_EQ(words(520.12345, 0.0498), "520.12 \u00b1 0.10\u00a0px");  // not 0.0996, nor 0.100
@@ -71,9 +71,9 @@ TEST(FormatCertifiedValue, StatesTwiceTheSdWithTwoDigits) {
   EXPECT_EQ(words(520.12345, 0), words(520.12345, std::nullopt));
 }
 
-TEST(CollectCertifiedValues, ReturnsStandardUncertaintiesOfCalibration) {
+TEST(ListCertifiedValues, ReturnsStandardUncertaintiesOfCalibration) {
   const Calibration calibration = measured();
-  const auto values = collect_certified_values(calibration);
+  const auto values = list_certified_values(calibration);
   ASSERT_EQ(values.size(), 10u);
   const std::vector<double> u{0.01, 0.02, 0.03, 0.04, 0.05, 0.06};
   for (std::size_t i = 0; i < u.size(); ++i) {
@@ -89,17 +89,17 @@ TEST(CollectCertifiedValues, ReturnsStandardUncertaintiesOfCalibration) {
   // The effect of the lens on the zenith is unknown.
   Calibration unknown = calibration;
   unknown.covariance = {{}, {"zenith_x", "zenith_y"}, Matrix2::Identity()};
-  EXPECT_FALSE(collect_certified_values(unknown)[6].standard_uncertainty);
+  EXPECT_FALSE(list_certified_values(unknown)[6].standard_uncertainty);
   // A calibration without uncertainties.
   for (const CertifiedValue& value :
-       collect_certified_values(read_calibration(kExample + "calibration.yaml"))) {
+       list_certified_values(read_calibration(kExample + "calibration.yaml"))) {
     EXPECT_FALSE(value.standard_uncertainty) << value.name;
   }
 }
 
-TEST(MakeCalibrationCertificate, ContainsMetricsGatesAndDecisionsOfRun) {
-  const std::string page = make_calibration_certificate(certified_run(), measured());
-  EXPECT_EQ(make_calibration_certificate(certified_run(), measured()), page);
+TEST(MakeCertificate, ContainsMetricsGatesAndDecisionsOfRun) {
+  const std::string page = make_certificate(certified_run(), measured());
+  EXPECT_EQ(make_certificate(certified_run(), measured()), page);
   EXPECT_THAT(
       page, AllOf(HasSubstr("Calibration certificate: camera &lt;0001&gt;"), HasSubstr("conforms"),
                   HasSubstr("20261121T134501Z-0001"), HasSubstr("2026-11-21T13:50:01Z"),
@@ -115,26 +115,26 @@ TEST(MakeCalibrationCertificate, ContainsMetricsGatesAndDecisionsOfRun) {
   EXPECT_THAT(page, HasSubstr("counter(pages)"));
 }
 
-TEST(MakeCalibrationCertificate, StatesNonconformityAndPrintOfBoard) {
+TEST(MakeCertificate, StatesNonconformityAndPrintOfBoard) {
   RunRecord record = certified_run();
   record.metrics[0].value = 0.4;
   record.metrics.push_back({"board_print_px", "px", 0.0625, {}, Direction::at_most});
-  record.set_verdict_from_causes({{"the lens is poor", true}});
-  EXPECT_THAT(make_calibration_certificate(record, measured()),
+  record.set_causes({{"the lens is poor", true}});
+  EXPECT_THAT(make_certificate(record, measured()),
               AllOf(HasSubstr("FAIL"), HasSubstr("the lens is poor."), HasSubstr("<td>no</td>"),
                     HasSubstr("0.0625 px, rms"), Not(HasSubstr("conforms with all"))));
 }
 
-TEST(MakeCalibrationCertificate, ThrowsForGoldenInvalidOrEditedRuns) {
+TEST(MakeCertificate, ThrowsForGoldenInvalidOrEditedRuns) {
   for (const auto& change : {+[](RunRecord& run) { run.kind = "golden"; },
                              +[](RunRecord& run) {
-                               run.set_verdict_from_causes({{"loose", false}});
+                               run.set_causes({{"loose", false}});
                              },
                              +[](RunRecord& run) { run.metrics[0].value = 0.4; },
                              +[](RunRecord& run) { run.calibration.clear(); }}) {
     RunRecord record = certified_run();
     change(record);
-    EXPECT_THROW(make_calibration_certificate(record, measured()), InputError) << record.kind;
+    EXPECT_THROW(make_certificate(record, measured()), InputError) << record.kind;
   }
 }
 

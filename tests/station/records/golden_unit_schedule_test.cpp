@@ -39,9 +39,9 @@ class FullDisk {
   void (*handler_)(int) = std::signal(SIGXFSZ, SIG_IGN);
 };
 
-class DescribeGoldenUnitProblem : public testing::Test {
+class DescribeGoldenProblem : public testing::Test {
  protected:
-  DescribeGoldenUnitProblem() {
+  DescribeGoldenProblem() {
     config.station = "a/station";
     config.spool = folder / "spool";
     config.nominal_camera.imager_px = {800, 600};
@@ -56,15 +56,15 @@ class DescribeGoldenUnitProblem : public testing::Test {
     run.kind = kind;
     run.verdict = verdict;
     run.ended_utc = ended_utc;
-    record_run_in_golden_unit_note(config, run);
+    record_golden_run(config, run);
   }
-  std::string problem() const { return describe_golden_unit_problem(config); }
+  std::string problem() const { return describe_golden_problem(config); }
 
   TemporaryFolder folder;
   StationConfig config{};
 };
 
-TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitUntilItPassesOnThisStation) {
+TEST_F(DescribeGoldenProblem, ReportsUnmeasuredGoldenUnitUntilItPassesOnThisStation) {
   note("unit", "PASS");
   EXPECT_THAT(problem(), StartsWith("the golden unit was not measured here yet: "));
   note("golden", "INVALID");
@@ -75,7 +75,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitUntilItPassesOnThis
   EXPECT_THAT(problem(), HasSubstr("not measured"));
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReportsReachedUnitLimitUntilGoldenUnitPasses) {
+TEST_F(DescribeGoldenProblem, ReportsReachedUnitLimitUntilGoldenUnitPasses) {
   note("golden", "PASS");
   note("unit", "FAIL");
   note("unit", "INVALID");
@@ -88,7 +88,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsReachedUnitLimitUntilGoldenUnitPasses) 
   EXPECT_EQ(problem(), "");
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReportsPassOlderThanHourLimitOrInFuture) {
+TEST_F(DescribeGoldenProblem, ReportsPassOlderThanHourLimitOrInFuture) {
   note("golden", "PASS", "2026-01-01T00:00:00Z");
   EXPECT_THAT(problem(), HasSubstr("measured 2026-01-01T00:00:00Z (run RUN), not within 24 h"));
   note("golden", "PASS", "9999-01-01T00:00:00Z");  // with a clock that was set back later
@@ -98,10 +98,8 @@ TEST_F(DescribeGoldenUnitProblem, ReportsPassOlderThanHourLimitOrInFuture) {
 }
 
 /// The unit was started before the limits expired.
-TEST_F(DescribeGoldenUnitProblem, IgnoresExpiredLimitsButNotFailureAtVerdict) {
-  const auto at_verdict = [&] {
-    return describe_golden_unit_problem(config, GoldenCheckTime::verdict);
-  };
+TEST_F(DescribeGoldenProblem, IgnoresExpiredLimitsButNotFailureAtVerdict) {
+  const auto at_verdict = [&] { return describe_golden_problem(config, GoldenCheckTime::verdict); };
   EXPECT_THAT(at_verdict(), HasSubstr("not measured"));
   note("golden", "PASS", "2026-01-01T00:00:00Z");
   EXPECT_THAT(problem(), HasSubstr("not within 24 h"));
@@ -121,7 +119,7 @@ TEST_F(DescribeGoldenUnitProblem, IgnoresExpiredLimitsButNotFailureAtVerdict) {
 }
 
 /// A golden run with another lamp map does not qualify the station.
-TEST_F(DescribeGoldenUnitProblem, ReportsChangedLampMapUntilReverted) {
+TEST_F(DescribeGoldenProblem, ReportsChangedLampMapUntilReverted) {
   note("golden", "PASS");
   ASSERT_EQ(problem(), "");
   config.sha256 = "of other comments";
@@ -140,7 +138,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsChangedLampMapUntilReverted) {
 }
 
 /// An earlier PASS is not valid after a run that could not be noted.
-TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitWhenNoteCouldNotBeWritten) {
+TEST_F(DescribeGoldenProblem, ReportsUnmeasuredGoldenUnitWhenNoteCouldNotBeWritten) {
   for (const std::string kind : {"golden", "unit"}) {
     note("golden", "PASS");
     ASSERT_EQ(problem(), "");
@@ -152,7 +150,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitWhenNoteCouldNotBeW
   }
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReportsUnknownResultForDamagedNote) {
+TEST_F(DescribeGoldenProblem, ReportsUnknownResultForDamagedNote) {
   note("golden", "PASS");
   ASSERT_EQ(problem(), "");
   const auto file = std::filesystem::directory_iterator(config.spool)->path();
@@ -169,7 +167,7 @@ TEST_F(DescribeGoldenUnitProblem, ReportsUnknownResultForDamagedNote) {
   EXPECT_THAT(problem(), HasSubstr("the result of the golden unit is unknown"));
 }
 
-TEST_F(DescribeGoldenUnitProblem, RejectsSymbolicLinkAsNote) {
+TEST_F(DescribeGoldenProblem, RejectsSymbolicLinkAsNote) {
   note("golden", "PASS");
   const auto file = std::filesystem::directory_iterator(config.spool)->path();
   std::filesystem::remove(file);
@@ -178,19 +176,19 @@ TEST_F(DescribeGoldenUnitProblem, RejectsSymbolicLinkAsNote) {
   EXPECT_THAT(problem(), HasSubstr("is a symbolic link"));
   EXPECT_THROW(note("unit", "PASS"), InputError);
   std::filesystem::create_symlink(mine, file);
-  EXPECT_FALSE(delete_golden_unit_note_of_run(config, "RUN"));
+  EXPECT_FALSE(delete_golden_note(config, "RUN"));
   note("golden", "PASS");
   EXPECT_EQ(problem(), "");
   EXPECT_EQ(TemporaryFolder::read_content(mine), "mine\n");
 }
 
-TEST_F(DescribeGoldenUnitProblem, ReportsUnmeasuredGoldenUnitWhenItsRunIsVoided) {
+TEST_F(DescribeGoldenProblem, ReportsUnmeasuredGoldenUnitWhenItsRunIsVoided) {
   note("golden", "PASS");
-  delete_golden_unit_note_of_run(config, "another");
+  delete_golden_note(config, "another");
   EXPECT_EQ(problem(), "");
-  delete_golden_unit_note_of_run(config, "RUN");
+  delete_golden_note(config, "RUN");
   EXPECT_THAT(problem(), HasSubstr("not measured here yet"));
-  delete_golden_unit_note_of_run(config, "RUN");
+  delete_golden_note(config, "RUN");
 }
 
 /// The station in datasets/station, with a golden unit.
@@ -212,9 +210,7 @@ class ComputeMeasurementSettingsDigest : public testing::Test {
     ASSERT_NE(at, std::string::npos) << from;
     folder.file(file, text.replace(at, from.size(), to));
   }
-  std::string digest() const {
-    return hash_measurement_settings(read_station_config(folder / "station.yaml"));
-  }
+  std::string digest() const { return hash_settings(read_station_config(folder / "station.yaml")); }
   /// Returns the digest with a temporary change.
   std::string digest_with(const std::string& file, const std::string& from, const std::string& to) {
     const std::string before = TemporaryFolder::read_content(folder / file);

@@ -119,9 +119,9 @@ TEST_F(RunStationHook, HookKeepsLockWhenStationIsKilled) {
   };
   ASSERT_TRUE(wait_for([&] { return std::filesystem::exists(folder / "begun"); }));
   kill_child(station);
-  EXPECT_FALSE(HookLock(folder / ".", name).has_acquired_hook_lock());
+  EXPECT_FALSE(HookLock(folder / ".", name).is_holding());
   folder.file("end", "");
-  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).has_acquired_hook_lock(); }));
+  EXPECT_TRUE(wait_for([&] { return HookLock(folder / ".", name).is_holding(); }));
 }
 
 /// The parent of this program can ignore signals and leave files open.
@@ -143,7 +143,7 @@ TEST_F(RunStationHook, IsHookPendingUntilRequestedHookSucceeds) {
   RunRecord run = judged_run();
   EXPECT_FALSE(is_hook_pending(run));
   EXPECT_EQ(describe_pending_hook(run), "");
-  run.events.push_back(make_hook_requested_event({{"label", "it"}, {}, 1}, "Ann"));
+  run.events.push_back(make_requested_event({{"label", "it"}, {}, 1}, "Ann"));
   EXPECT_EQ(run.events.back().text, "label it");
   EXPECT_THAT(run.events.back().author, testing::MatchesRegex("Ann [(][^@]+@[^@]*[)]"));
   EXPECT_TRUE(is_hook_pending(run));
@@ -165,11 +165,11 @@ TEST_F(RunStationHook, SecondHookLockOfSameRunIsNotAcquired) {
   const std::string name = judged_run().run;
   {
     const HookLock first_lock(folder / ".", name), other(folder / ".", name);
-    EXPECT_TRUE(first_lock.has_acquired_hook_lock());
-    EXPECT_FALSE(other.has_acquired_hook_lock());
-    EXPECT_TRUE(HookLock(folder / ".", "another").has_acquired_hook_lock());
+    EXPECT_TRUE(first_lock.is_holding());
+    EXPECT_FALSE(other.is_holding());
+    EXPECT_TRUE(HookLock(folder / ".", "another").is_holding());
   }
-  EXPECT_TRUE(HookLock(folder / ".", name).has_acquired_hook_lock());
+  EXPECT_TRUE(HookLock(folder / ".", name).is_holding());
   EXPECT_TRUE(std::filesystem::is_empty(folder / "."));
 }
 
@@ -177,8 +177,8 @@ TEST(HookLock, CreatesNoFileThroughSymbolicLink) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "spool");
   std::filesystem::create_symlink(folder / "elsewhere", folder / "spool/.hook-run");
-  EXPECT_LT(HookLock(folder / "spool", "run").descriptor_of_lock_file(), 0);
-  EXPECT_LT(HookLock(folder / "spool", "/../../elsewhere").descriptor_of_lock_file(), 0);
+  EXPECT_LT(HookLock(folder / "spool", "run").descriptor(), 0);
+  EXPECT_LT(HookLock(folder / "spool", "/../../elsewhere").descriptor(), 0);
   EXPECT_FALSE(std::filesystem::exists(folder / "elsewhere"));
 }
 

@@ -26,14 +26,14 @@ inline RunRecord numbered_run(int number) {
   run.camera = "camera-" + std::to_string(number);
   run.begun_utc = start_utc_of_run_id(run.run);
   run.ended_utc = "2026-11-21T13:50:01Z";
-  run.set_verdict_from_causes({{"the lens is \"blurred\"", true}, {"second", false}});
+  run.set_causes({{"the lens is \"blurred\"", true}, {"second", false}});
   run.program = "vlp-station 0";
   run.libraries = "none";
   run.config_sha256 = std::string(64, 'a');
   run.calibration = "format: vlp-calibration/1\n";
-  run.metrics = check_all_metrics_against_gates(
-      {{"rms_px", 1, GuardBand{0.01, 1.645}}, {"tilt_deg", 2}},
-      {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, list_unit_metric_kinds());
+  run.metrics =
+      check_against_gates({{"rms_px", 1, GuardBand{0.01, 1.645}}, {"tilt_deg", 2}},
+                          {{"rms_px", 0.1 + 0.2}, {"coverage", 1.0 / 3}}, list_unit_metrics());
   for (std::size_t i = 0; i < kImagesOfARun; ++i) {
     run.images.push_back({"boards", std::to_string(1000 + i) + ".png",
                           "digest-" + std::to_string(number) + "-" + std::to_string(i), ""});

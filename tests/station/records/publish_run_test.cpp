@@ -58,7 +58,7 @@ TEST(PublishRunFiles, ReplacesDifferentReportOnRequest) {
   folder.file((results / "report.html").string(), "again");
   publish_run_files(record, {}, folder / "results", ExistingReport::replace);
   EXPECT_EQ(TemporaryFolder::read_content(results / "replaced-report.html"), "planted");
-  EXPECT_TRUE(rename_files_of_voided_run(record, folder / "results"));
+  EXPECT_TRUE(rename_voided_files(record, folder / "results"));
   EXPECT_FALSE(fs::exists(results / "replaced-report.html"));
 }
 
@@ -73,8 +73,7 @@ TEST(PublishRunFiles, WritesNothingOutsideResultsFolder) {
   record.run = "../../../x";
   EXPECT_THAT(rejection_message([&] { publish_run_files(record, {}, folder / "results"); }),
               HasSubstr("'../../../x' is no id of a run"));
-  EXPECT_THAT(rejection_message([&] { rename_files_of_voided_run(passed(), folder / "results"); }),
-              "");
+  EXPECT_THAT(rejection_message([&] { rename_voided_files(passed(), folder / "results"); }), "");
   EXPECT_FALSE(fs::exists(folder / "results"));
   record = passed();
   fs::create_directory(folder / "results");
@@ -84,18 +83,17 @@ TEST(PublishRunFiles, WritesNothingOutsideResultsFolder) {
                 HasSubstr("0001: is a symbolic link, which is not followed"));
   };
   expect_link([&] { publish_run_files(record, {}, folder / "results"); });
-  expect_link([&] { rename_files_of_voided_run(record, folder / "results"); });
-  expect_link([&] { check_results_folder_writable(folder / "results", "0001"); });
+  expect_link([&] { rename_voided_files(record, folder / "results"); });
+  expect_link([&] { check_results_writable(folder / "results", "0001"); });
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
 
-TEST(CheckResultsFolderWritable, RemovesSymbolicLinkOfTestFileAndKeepsItsTarget) {
+TEST(CheckResultsWritable, RemovesSymbolicLinkOfTestFileAndKeepsItsTarget) {
   const TemporaryFolder folder;
   const fs::path mine = folder.file("mine.txt", "mine");
   fs::create_directories(folder / "results/0001");
   fs::create_symlink(mine, folder / "results/0001/.writable");
-  EXPECT_EQ(rejection_message([&] { check_results_folder_writable(folder / "results", "0001"); }),
-            "");
+  EXPECT_EQ(rejection_message([&] { check_results_writable(folder / "results", "0001"); }), "");
   EXPECT_EQ(TemporaryFolder::read_content(mine), "mine");
   EXPECT_FALSE(fs::is_symlink(folder / "results/0001/.writable"));
 }
@@ -123,18 +121,18 @@ TEST(PublishRunFiles, ThrowsWhenExistingCalibrationDiffersFromRecord) {
 TEST(PublishRunFiles, PrefixesCalibrationFileNameWithFailedOrInvalid) {
   const TemporaryFolder folder;
   RunRecord record = passed();
-  record.set_verdict_from_causes({{"the lens is decentered", true}});
+  record.set_causes({{"the lens is decentered", true}});
   EXPECT_TRUE(fs::exists(publish_run_files(record, {}, folder / "a") / "failed-calibration.yaml"));
-  record.set_verdict_from_causes({{"lamp 5 is loose", false}});
+  record.set_causes({{"lamp 5 is loose", false}});
   EXPECT_TRUE(fs::exists(publish_run_files(record, {}, folder / "b") / "invalid-calibration.yaml"));
 }
 
-TEST(RenameFilesOfVoidedRun, PrefixesAllFileNamesWithVoided) {
+TEST(RenameVoidedFiles, PrefixesAllFileNamesWithVoided) {
   const TemporaryFolder folder;
   RunRecord record = passed();
   const fs::path results = publish_run_files(record, {}, folder / "results");
   folder.file((results / "certificate.html").string(), "certificate");
-  rename_files_of_voided_run(record, folder / "results");
+  rename_voided_files(record, folder / "results");
   std::vector<std::string> names;
   for (const auto& file : fs::directory_iterator(results)) {
     names.push_back(file.path().filename().string());
@@ -143,22 +141,20 @@ TEST(RenameFilesOfVoidedRun, PrefixesAllFileNamesWithVoided) {
               testing::UnorderedElementsAre("voided-calibration.yaml", "voided-certificate.html",
                                             "voided-report.html"));
   // As after a kill before the files are written.
-  rename_files_of_voided_run(record, folder / "results");
-  rename_files_of_voided_run(record, folder / "none");
+  rename_voided_files(record, folder / "results");
+  rename_voided_files(record, folder / "none");
   // A run that is published after it was voided.
   record.events.push_back(make_run_event_now(kVoided, "wrong serial", "Ann"));
   EXPECT_TRUE(fs::exists(publish_run_files(record, {}, folder / "a") / "voided-calibration.yaml"));
   EXPECT_FALSE(fs::exists(folder / "a" / record.camera / record.run / "report.html"));
 }
 
-TEST(CheckResultsFolderWritable, ThrowsIfFolderCannotBeCreated) {
+TEST(CheckResultsWritable, ThrowsIfFolderCannotBeCreated) {
   const TemporaryFolder folder;
-  EXPECT_EQ(rejection_message([&] { check_results_folder_writable(folder / "results", "0001"); }),
-            "");
+  EXPECT_EQ(rejection_message([&] { check_results_writable(folder / "results", "0001"); }), "");
   EXPECT_TRUE(fs::is_empty(folder / "results/0001"));
-  EXPECT_THAT(
-      rejection_message([&] { check_results_folder_writable(folder.file("file", ""), "0001"); }),
-      HasSubstr("file: cannot be made"));
+  EXPECT_THAT(rejection_message([&] { check_results_writable(folder.file("file", ""), "0001"); }),
+              HasSubstr("file: cannot be made"));
 }
 
 }  // namespace

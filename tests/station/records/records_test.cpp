@@ -31,18 +31,18 @@ using testing::StartsWith;
 /// Returns a record with a different text in each of its fields.
 RunRecord with_all_texts() {
   RunRecord record = make_sample_record(numbered_run_id(7), "a", 0.5);
-  for (const RunField& field : list_run_text_fields()) {
+  for (const RunField& field : list_run_fields()) {
     record.*field.text = std::string("the '") + field.name + "' of \"it\"\n";
   }
   return record;
 }
 
 void check_all_texts(Records& records) {
-  const RunRecord kept = escape_texts_of_run(with_all_texts());
+  const RunRecord kept = escape_run(with_all_texts());
   records.store_run(kept);
   const auto found = records.find_run_by_id(kept.run);
   ASSERT_TRUE(found);
-  for (const RunField& field : list_run_text_fields()) {
+  for (const RunField& field : list_run_fields()) {
     EXPECT_EQ((*found).*field.text, kept.*field.text) << field.name;
   }
 }
@@ -83,7 +83,7 @@ void check_voided(Records& records) {
   records.store_run(run);
   const auto found = records.find_run_by_id(run.run);
   ASSERT_TRUE(found);
-  EXPECT_THAT(describe_why_verdict_is_void_or_edited(*found),
+  EXPECT_THAT(explain_void_verdict(*found),
               testing::MatchesRegex("was voided by Ann [(].*@.*: wrong serial"));
   EXPECT_THAT(records.load_metric_trend("rms_px", {}), SizeIs(before - 1));
   EXPECT_EQ(records.list_run_summaries({})[0].run, run.run);
@@ -118,7 +118,7 @@ void check_records(const std::string& where) {
               ElementsAre(numbered_run_id(2)));
   EXPECT_THAT(list_ids(records, {.image_sha256 = std::string(64, 'c')}), IsEmpty())
       << "it was refused there";
-  EXPECT_EQ(rejection_message([&] { records.check_database_writable(); }), "");
+  EXPECT_EQ(rejection_message([&] { records.check_writable(); }), "");
   RunFilter filter;
   filter.camera = "a";
   EXPECT_THAT(records.list_run_summaries(filter), SizeIs(3));
@@ -156,7 +156,7 @@ void check_records(const std::string& where) {
   check_all_texts(records);
   check_events(records);
   check_voided(records);
-  const TrailCheck trail = records.check_records_by_audit_trail("");
+  const TrailCheck trail = records.check_trail("");
   EXPECT_THAT(trail.problems, IsEmpty());
   EXPECT_EQ(trail.runs, 7U);
   EXPECT_EQ(trail.entries, 7U + 6U) << "runs and events";
@@ -207,7 +207,7 @@ TEST(Records, CheckDatabaseWritableThrowsWhenUpdateFails) {
       "CREATE TRIGGER stop BEFORE UPDATE ON vlp_schema BEGIN SELECT RAISE(ABORT, 'stopped'); "
       "END;\n");
   Records records(file);
-  EXPECT_THAT(rejection_message([&] { records.check_database_writable(); }), HasSubstr("stopped"));
+  EXPECT_THAT(rejection_message([&] { records.check_writable(); }), HasSubstr("stopped"));
 }
 
 TEST(Records, RejectsDatabasesOfOtherVersions) {
@@ -266,11 +266,11 @@ TEST(Records, ErrorsOmitPasswordOfServerAddress) {
 /// Returns the first line of a text.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
-TEST(ExportRunsToFile, WritesMetricsAndSelectedTextsAsCsv) {
+TEST(WriteRuns, WritesMetricsAndSelectedTextsAsCsv) {
   const TemporaryFolder folder;
   const auto file = folder / "runs.csv";
-  export_runs_to_file(file, {make_sample_record(numbered_run_id(1), "a", 0.25),
-                             make_sample_record(numbered_run_id(2), "b", 1.5), with_all_texts()});
+  write_runs(file, {make_sample_record(numbered_run_id(1), "a", 0.25),
+                    make_sample_record(numbered_run_id(2), "b", 1.5), with_all_texts()});
   const std::string csv = TemporaryFolder::read_content(file);
   EXPECT_EQ(
       first_line(csv),
@@ -288,12 +288,11 @@ TEST(ExportRunsToFile, WritesMetricsAndSelectedTextsAsCsv) {
       "check_worst_mm,check_offset_mm,check_height_mm,check_residual_px");
   EXPECT_THAT(csv, HasSubstr("2026-11-21T13:45:01Z,2026-11-21T13:45:01Z,PASS"));
   EXPECT_THAT(csv, HasSubstr("; second"));
-  for (const RunField& field : list_run_text_fields()) {
+  for (const RunField& field : list_run_fields()) {
     const std::string text = std::string("the '") + field.name + "' of ";
     EXPECT_EQ(csv.find(text) != std::string::npos, field.is_column) << field.name;
   }
-  EXPECT_THAT(rejection_message([&] { export_runs_to_file(folder / "runs.txt", {}); }),
-              HasSubstr(".csv"));
+  EXPECT_THAT(rejection_message([&] { write_runs(folder / "runs.txt", {}); }), HasSubstr(".csv"));
 }
 
 TEST(SerializeRun, DocumentsExportsAndHookMatchSchema) {
@@ -305,7 +304,7 @@ TEST(SerializeRun, DocumentsExportsAndHookMatchSchema) {
   invalid.events = {make_run_event_now(kVoided, "wrong serial", "Ann")};
   const std::vector<RunRecord> runs{make_sample_record(numbered_run_id(1), "a", 0.25), golden,
                                     invalid};
-  export_runs_to_file(folder / "runs.json", runs);
+  write_runs(folder / "runs.json", runs);
   const auto exported = nlohmann::json::parse(TemporaryFolder::read_content(folder / "runs.json"));
   ASSERT_THAT(exported, SizeIs(runs.size()));
   std::vector<std::filesystem::path> files;

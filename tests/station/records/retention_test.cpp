@@ -71,7 +71,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersReturnsFoldersOlderThanRetention) {
   }
   const fs::path without_record =
       with_file("captures/d." + kOld);  // the record is of another camera
-  const RetentionResult found = find_expired_run_folders(config, records);
+  const RetentionResult found = list_expired_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(2));
   EXPECT_EQ(found.expired[0].folder, images);
   EXPECT_STREQ(found.expired[0].event_kind, kImagesDeleted);
@@ -80,7 +80,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersReturnsFoldersOlderThanRetention) {
   EXPECT_STREQ(found.expired[1].event_kind, kResultsDeleted);
   EXPECT_THAT(found.folders_without_record, ElementsAre(without_record));
   config.retention = {std::nullopt, 30'000};
-  EXPECT_THAT(find_expired_run_folders(config, records).expired, IsEmpty());
+  EXPECT_THAT(list_expired_folders(config, records).expired, IsEmpty());
 }
 
 /// Stations can share folders and records.
@@ -92,7 +92,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersIgnoresOtherStationsAndSymbolicLinks)
   with_file("results/a/" + other);
   fs::create_directory_symlink(with_file("elsewhere"), folder / "captures" / ("a." + kOld));
   fs::create_directory_symlink(folder / "nowhere", folder / "results" / "a" / kOld);
-  const RetentionResult found = find_expired_run_folders(config, records);
+  const RetentionResult found = list_expired_folders(config, records);
   EXPECT_THAT(found.expired, IsEmpty());
   EXPECT_THAT(found.folders_without_record, IsEmpty());
 }
@@ -101,21 +101,20 @@ TEST_F(RetentionTest, DeleteExpiredRunFolderKeepsTargetsOfSymbolicLinks) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path images = with_file("captures/a." + kOld), elsewhere = with_file("elsewhere");
   fs::create_directory_symlink(elsewhere, images / "link");
-  const RetentionResult found = find_expired_run_folders(config, records);
+  const RetentionResult found = list_expired_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].bytes, 1000U);
   Spool spool(folder / "spool", (folder / "records.db").string());
-  delete_expired_run_folder(found.expired[0], config, spool);
+  delete_expired(found.expired[0], config, spool);
   EXPECT_FALSE(fs::exists(images));
   EXPECT_TRUE(fs::exists(elsewhere / "check/0.png"));
-  spool.deliver_waiting_runs();
+  spool.deliver_waiting();
   const auto record = records.find_run_by_id(kOld);
   ASSERT_TRUE(record);
   ASSERT_THAT(record->events, SizeIs(1));
   EXPECT_EQ(record->events[0].kind, kImagesDeleted);
   EXPECT_EQ(record->events[0].text, "kept 90 days, 0.0 MB");
-  EXPECT_THROW(delete_expired_run_folder(found.expired[0], config, spool), InputError)
-      << "it is not there";
+  EXPECT_THROW(delete_expired(found.expired[0], config, spool), InputError) << "it is not there";
 }
 
 /// The golden unit's calibration can be among the results of the run that measured it.
@@ -124,25 +123,24 @@ TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedByStation) {
   const fs::path results = with_file("results/a/" + kOld), images = with_file("captures/a." + kOld);
   config.inputs = {folder.file("station.yaml", ""),
                    folder.file("results/a/" + kOld + "/calibration.yaml", "")};
-  const RetentionResult found = find_expired_run_folders(config, records);
+  const RetentionResult found = list_expired_folders(config, records);
   EXPECT_THAT(found.folders_in_use, ElementsAre(results));
   ASSERT_THAT(found.expired, SizeIs(1));
   EXPECT_EQ(found.expired[0].folder, images);
   // Through a link, and by another name.
   fs::create_symlink(config.inputs[1], folder / "golden.yaml");
   config.inputs[1] = folder / "golden.yaml";
-  EXPECT_THAT(find_expired_run_folders(config, records).folders_in_use, ElementsAre(results));
+  EXPECT_THAT(list_expired_folders(config, records).folders_in_use, ElementsAre(results));
   config.inputs = {};
   config.spool = images / "spool";
-  EXPECT_THAT(find_expired_run_folders(config, records).folders_in_use, ElementsAre(images));
+  EXPECT_THAT(list_expired_folders(config, records).folders_in_use, ElementsAre(images));
 }
 
 TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedThroughSymbolicLinks) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld);
   const auto expect_in_use = [&](const std::string& why) {
-    EXPECT_THAT(find_expired_run_folders(config, records).folders_in_use, ElementsAre(results))
-        << why;
+    EXPECT_THAT(list_expired_folders(config, records).folders_in_use, ElementsAre(results)) << why;
   };
   fs::create_symlink(folder.file("elsewhere.yaml", ""), results / "golden.yaml");
   config.inputs = {results / "golden.yaml"};
@@ -154,7 +152,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedThroughSymbolicLin
   config.inputs = {folder / "loop"};
   expect_in_use("cannot be followed");
   config.inputs = {folder / "elsewhere.yaml", folder / "none"};
-  ASSERT_THAT(find_expired_run_folders(config, records).folders_in_use, IsEmpty());
+  ASSERT_THAT(list_expired_folders(config, records).folders_in_use, IsEmpty());
   const std::string script = "results/a/" + kOld + "/hook.py";
   config.hook = Hook{{"python3", script, std::string(5000, 'x')}, folder / ""};
   folder.file(script, "");
@@ -165,21 +163,18 @@ TEST_F(RetentionTest, DeleteExpiredRunFolderThrowsWhenCameraFolderBecameSymbolic
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   with_file("results/a/" + kOld);
   const fs::path kept = with_file("elsewhere/" + kOld);
-  const RetentionResult found = find_expired_run_folders(config, records);
+  const RetentionResult found = list_expired_folders(config, records);
   ASSERT_THAT(found.expired, SizeIs(1));
   fs::remove_all(folder / "results/a");
   fs::create_directory_symlink(folder / "elsewhere", folder / "results/a");
   Spool spool(folder / "spool", (folder / "records.db").string());
-  EXPECT_THAT(
-      rejection_message([&] { delete_expired_run_folder(found.expired[0], config, spool); }),
-      HasSubstr("results/a: is a symbolic link"));
+  EXPECT_THAT(rejection_message([&] { delete_expired(found.expired[0], config, spool); }),
+              HasSubstr("results/a: is a symbolic link"));
   EXPECT_TRUE(fs::exists(kept / "check/0.png"));
 }
 
 TEST_F(RetentionTest, CheckClockThrowsWhenNewestRunIsOverYearBeforeClock) {
-  const auto refusal = [&] {
-    return rejection_message([&] { check_clock_against_recorded_runs(config, records); });
-  };
+  const auto refusal = [&] { return rejection_message([&] { check_clock(config, records); }); };
   EXPECT_EQ(refusal(), "") << "no run";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   keep(make_run_id(), "a", get_current_utc(), "another");
@@ -198,15 +193,15 @@ TEST_F(RetentionTest, CheckClockThrowsWhenNewestRunIsOverYearBeforeClock) {
 
 TEST_F(RetentionTest, CheckClockThrowsWhenRunEndedInFutureUnlessVoided) {
   keep(make_run_id(), "a", utc_days_ago(0));
-  EXPECT_EQ(rejection_message([&] { check_clock_against_recorded_runs(config, records); }), "");
+  EXPECT_EQ(rejection_message([&] { check_clock(config, records); }), "");
   const std::string run = make_run_id(), coming = utc_days_ago(-20 * 366);
   keep(run, "a", coming);
-  EXPECT_THAT(rejection_message([&] { check_clock_against_recorded_runs(config, records); }),
+  EXPECT_THAT(rejection_message([&] { check_clock(config, records); }),
               HasSubstr("the newest run ended " + coming + ", after the clock"));
   RunRecord voided_run = *records.find_run_by_id(run);
   voided_run.events.push_back(make_run_event_now(kVoided, "wrong clock", "Ann"));
   records.store_run(voided_run);
-  EXPECT_EQ(rejection_message([&] { check_clock_against_recorded_runs(config, records); }), "");
+  EXPECT_EQ(rejection_message([&] { check_clock(config, records); }), "");
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ TEST(EscapeRunTexts, KeepsLineBreaksOnlyInCausesAndCalibration) {
   run.calibration = "camera:\n  id: 1\n";
   run.images = {{"boards", "a\n.png", "", "\x1b"}};
   run.events = {{"", "", "why\n", "who\n"}};
-  const RunRecord printed = escape_texts_of_run(run);
+  const RunRecord printed = escape_run(run);
   EXPECT_EQ(printed.operator_name, "J\\xf6rg\\x0a");
   EXPECT_EQ(printed.causes, run.causes);
   EXPECT_EQ(printed.calibration, run.calibration);
@@ -72,14 +72,14 @@ TEST(DescribeClockProblem, ReportsRunThatEndedBeforeItsStart) {
 
 TEST(ParseRunDocument, ReturnsAllFieldsOfSerializedRun) {
   RunRecord run = numbered_run(1);
-  for (const RunField& field : list_run_text_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
+  for (const RunField& field : list_run_fields()) run.*field.text += "\"\\ \xc3\xbc{}";
   for (std::string* lines : {&run.causes, &run.calibration}) lines->append("\n\tof lines\n");
   run.images[0].name = "\xff\x1b[31m.png";
   run.images[1].rejection = "too dark";
   const std::string document = serialize_run(run);
   const RunRecord read = parse_run_document(document);
   EXPECT_EQ(serialize_run(read), document);
-  for (const RunField& field : list_run_text_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
+  for (const RunField& field : list_run_fields()) EXPECT_EQ(read.*field.text, run.*field.text);
   ASSERT_THAT(read.metrics, SizeIs(run.metrics.size()));
   for (std::size_t i = 0; i < run.metrics.size(); ++i) {
     EXPECT_EQ(read.metrics[i].name, run.metrics[i].name);

@@ -56,12 +56,12 @@ TEST(Spool, DeliverGivesUpOnLockedDatabaseWithin15Seconds) {
   EXPECT_TRUE(fs::exists(locked));
   Spool spool(folder / "spool", where);
   spool.store_run(numbered_run(1));
-  EXPECT_LT(measure_seconds([&] { spool.deliver_waiting_runs(); }), 15);
-  EXPECT_THAT(spool.describe_spool_state(),
+  EXPECT_LT(measure_seconds([&] { spool.deliver_waiting(); }), 15);
+  EXPECT_THAT(spool.describe_state(),
               AllOf(StartsWith("runs are queued in the spool, 1 waiting"), HasSubstr("locked")));
   folder.file("done", "");
   other.join();
-  Spool(folder / "spool", where).deliver_waiting_runs();
+  Spool(folder / "spool", where).deliver_waiting();
   EXPECT_THAT(whole_runs(where), SizeIs(1));
 }
 
@@ -82,19 +82,19 @@ TEST(Spool, LosesNoRunWhenDiskOfRecordsIsFull) {
   const std::string where = (small / "records.db").string();
   {
     Spool spool(folder / "spool", where);
-    spool.check_runs_can_be_stored();
+    spool.check_can_store();
     for (int i = 0; i < 40; ++i) spool.store_run(numbered_run(i));
-    spool.deliver_waiting_runs();
+    spool.deliver_waiting();
     const std::size_t num_stored = whole_runs(where).size();
     EXPECT_LT(num_stored, 40u);
     EXPECT_THAT(spool.list_waiting_runs(), SizeIs(40 - num_stored));
-    EXPECT_THAT(spool.describe_spool_state(), HasSubstr("full"));
+    EXPECT_THAT(spool.describe_state(), HasSubstr("full"));
     // Full records are readable.
-    EXPECT_EQ(spool.find_run_of_other_camera_using_image("digest-0-1", "b"),
+    EXPECT_EQ(spool.find_other_user("digest-0-1", "b"),
               (ImageUser{"camera-0", numbered_run(0).run}));
   }
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
-  Spool(folder / "spool", where).deliver_waiting_runs();
+  Spool(folder / "spool", where).deliver_waiting();
   EXPECT_THAT(whole_runs(where), SizeIs(40));
 }
 
@@ -117,17 +117,17 @@ TEST(Spool, LosesNoRunWhenDiskOfSpoolIsFull) {
   EXPECT_THAT(refused, AllOf(HasSubstr("can be stored neither in the spool"), HasSubstr("full")));
   ASSERT_GT(num_waiting, 0u);
   EXPECT_THAT(offline.list_waiting_runs(), SizeIs(num_waiting));
-  EXPECT_NE(rejection_message([&] { offline.check_runs_can_be_stored(); }), "");
+  EXPECT_NE(rejection_message([&] { offline.check_can_store(); }), "");
   // The records take the next run. Those that wait are delivered, too, but not removed.
   { const Records made(where); }
   Spool full(small, where);
   full.store_run(numbered_run(1000));
   EXPECT_EQ(whole_runs(where), std::set<std::string>{numbered_run(1000).run});
-  full.deliver_waiting_runs();
+  full.deliver_waiting();
   EXPECT_THAT(whole_runs(where), SizeIs(num_waiting + 1));
   ASSERT_EQ(::mount("none", small.c_str(), "tmpfs", MS_REMOUNT, "size=8m"), 0);
-  full.check_runs_can_be_stored();
-  EXPECT_EQ(full.describe_spool_state(), "");
+  full.check_can_store();
+  EXPECT_EQ(full.describe_state(), "");
   EXPECT_THAT(whole_runs(where), SizeIs(num_waiting + 1));
 }
 
@@ -141,13 +141,13 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
   for (int i = 0; i < kills; ++i) {
     const pid_t child = start_child([&] {
       Spool spool(folder / "spool", where);
-      spool.check_runs_can_be_stored();
+      spool.check_can_store();
       const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
       for (int run = 1000 * i; run < 1000 * i + 1000; ++run) {
         spool.store_run(numbered_run(run));
         const std::string line = numbered_run(run).run + "\n";  // reported as kept
         if (::write(file, line.data(), line.size()) < 0) std::abort();
-        spool.deliver_waiting_runs();
+        spool.deliver_waiting();
       }
     });
     const int wait_us = static_cast<int>(1e6 * random.uniform(0, max_wait_s));
@@ -156,8 +156,8 @@ void kill_while_keeping(const TemporaryFolder& folder, const std::string& where,
     if (!fs::exists(log) || fs::is_empty(log)) max_wait_s *= 2;
   }
   Spool spool(folder / "spool", where);
-  spool.check_runs_can_be_stored();
-  EXPECT_EQ(spool.describe_spool_state(), "");
+  spool.check_can_store();
+  EXPECT_EQ(spool.describe_state(), "");
   const auto runs = whole_runs(where);
   std::istringstream kept(TemporaryFolder::read_content(log));
   int count = 0;
@@ -181,10 +181,10 @@ TEST(Spool, StateDistinguishesServerRefusalFromUnreachableServer) {
   const auto state_with = [&](const std::string& password, const std::string& database, int run) {
     Spool spool(folder / "spool",
                 "postgresql://vlp:" + password + "@" + server.address() + "/" + database);
-    spool.check_runs_can_be_stored();
+    spool.check_can_store();
     spool.store_run(numbered_run(run));
-    spool.deliver_waiting_runs();
-    return spool.describe_spool_state();
+    spool.deliver_waiting();
+    return spool.describe_state();
   };
   const std::string refuses =
       "the server of the records answers, but refuses 'records' of station.yaml: ";
@@ -224,23 +224,23 @@ TEST(Spool, NoticeAndStateForOperatorContainNoSql) {
   };
   // Its user has no right to the tables.
   Spool guest = open_spool("guest:guest", "guest");
-  guest.check_runs_can_be_stored();
-  EXPECT_EQ(guest.make_spool_notice_for_operator(),
+  guest.check_can_store();
+  EXPECT_EQ(guest.make_operator_notice(),
             "records are offline (access refused); runs are kept, delivered automatically");
   guest.store_run(numbered_run(1));
-  guest.deliver_waiting_runs();
-  EXPECT_EQ(guest.make_spool_notice_for_operator(),
+  guest.deliver_waiting();
+  EXPECT_EQ(guest.make_operator_notice(),
             "records are offline (access refused); 1 run kept, delivered automatically");
-  EXPECT_THAT(guest.describe_spool_state(),
+  EXPECT_THAT(guest.describe_state(),
               AllOf(HasSubstr("permission denied"), Not(HasSubstr("SELECT")),
                     Not(HasSubstr("UPDATE")), Not(HasSubstr("while"))));
   server.stop();
   Spool offline = open_spool("vlp:right", "offline");
-  offline.check_runs_can_be_stored();
+  offline.check_can_store();
   for (int run = 1; run <= 2; ++run) offline.store_run(numbered_run(run));
-  EXPECT_EQ(offline.make_spool_notice_for_operator(),
+  EXPECT_EQ(offline.make_operator_notice(),
             "records are offline; 2 runs kept, delivered automatically");
-  EXPECT_THAT(offline.describe_spool_state(), HasSubstr("cannot be reached"));
+  EXPECT_THAT(offline.describe_state(), HasSubstr("cannot be reached"));
 }
 
 /// Server that accepts only TLS, with its own certificate.
@@ -253,10 +253,10 @@ TEST(Spool, DeliversToTlsServerUnlessTlsIsOffOrCertificateCheckFails) {
   const auto state_with = [&](const std::string& options) {
     Spool spool(folder / "spool",
                 "postgresql://vlp:right@localhost:" + server.port() + "/postgres?" + options);
-    spool.check_runs_can_be_stored();
+    spool.check_can_store();
     spool.store_run(numbered_run(++run));
-    spool.deliver_waiting_runs();
-    return spool.describe_spool_state();
+    spool.deliver_waiting();
+    return spool.describe_state();
   };
   EXPECT_EQ(state_with("sslmode=require"), "");
   EXPECT_EQ(state_with("sslmode=verify-full&sslrootcert=" + server.certificate().string()), "");
@@ -294,16 +294,16 @@ TEST(Spool, DeliversAllRunsOfEightStationsToOneServer) {
   for (int station = 0; station < stations; ++station) {
     children.push_back(start_child([&, station] {
       Spool spool = open_spool(station);
-      spool.check_runs_can_be_stored();  // one of them makes the tables
+      spool.check_can_store();  // one of them makes the tables
       for (int i = 0; i < each; ++i) {
         RunRecord run = numbered_run(1000 * station + i);
         run.station = "station-" + std::to_string(station);
         run.events = {make_run_event_now(kHookRequested, "label")};
         spool.store_run(run);
-        spool.deliver_waiting_runs();
+        spool.deliver_waiting();
         run.events.push_back(make_run_event_now(kHookDone, ""));
         spool.store_run(run);
-        spool.deliver_waiting_runs();
+        spool.deliver_waiting();
       }
     }));
   }
@@ -312,13 +312,13 @@ TEST(Spool, DeliversAllRunsOfEightStationsToOneServer) {
     // No station waited longer than allowed, unless this machine is busy.
     Spool spool = open_spool(station);
     std::cout << "station-" << station << ": " << spool.list_waiting_runs().size() << " waited\n";
-    spool.deliver_waiting_runs();
-    EXPECT_EQ(spool.describe_spool_state(), "");
+    spool.deliver_waiting();
+    EXPECT_EQ(spool.describe_state(), "");
   }
   EXPECT_THAT(Records(server.uri()).list_run_summaries({.has_open_hook = true}), IsEmpty());
   const auto count = static_cast<std::size_t>(stations * each);
   EXPECT_THAT(whole_runs(server.uri()), SizeIs(count));
-  const TrailCheck trail = Records(server.uri()).check_records_by_audit_trail("");
+  const TrailCheck trail = Records(server.uri()).check_trail("");
   EXPECT_THAT(trail.problems, IsEmpty());
   EXPECT_EQ(trail.entries, 3 * count) << "of each run and its two events, once";
   EXPECT_THAT(server.log(), Not(HasSubstr("deadlock")));
@@ -334,58 +334,54 @@ TEST(Spool, DeliversAllRunsAfterServerStoppedDuringDelivery) {
   kill_while_keeping(folder, where, 5);
   const std::size_t before = whole_runs(where).size();
   const auto deliver_to = [&](std::size_t count) {
-    Spool(spool()).deliver_waiting_runs();
+    Spool(spool()).deliver_waiting();
     EXPECT_THAT(whole_runs(where), SizeIs(before + count));
   };
 
   // Stopped before the record; new units begin.
   Spool running = spool();
-  running.check_runs_can_be_stored();
+  running.check_can_store();
   server.stop();
   running.store_run(numbered_run(-1));
-  running.deliver_waiting_runs();
-  EXPECT_THAT(running.describe_spool_state(),
+  running.deliver_waiting();
+  EXPECT_THAT(running.describe_state(),
               AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                     HasSubstr("server of the records cannot be reached")));
   Spool begun = spool();
-  begun.check_runs_can_be_stored();
+  begun.check_can_store();
   begun.store_run(numbered_run(-2));
-  begun.deliver_waiting_runs();
-  EXPECT_THAT(begun.describe_spool_state(),
-              StartsWith("runs are queued in the spool, 2 waiting: "));
+  begun.deliver_waiting();
+  EXPECT_THAT(begun.describe_state(), StartsWith("runs are queued in the spool, 2 waiting: "));
   server.start();
   deliver_to(2);
 
   // Frozen, with and without a connection: programs wait once, and report it.
   Spool connected = spool();
-  connected.check_runs_can_be_stored();
-  EXPECT_EQ(connected.describe_spool_state(), "");
+  connected.check_can_store();
+  EXPECT_EQ(connected.describe_state(), "");
   server.freeze();
-  EXPECT_LT(measure_seconds([&] {
-              EXPECT_EQ(connected.find_run_of_other_camera_using_image("digest-1-1", "b"),
-                        ImageUser{});
-            }),
+  EXPECT_LT(measure_seconds(
+                [&] { EXPECT_EQ(connected.find_other_user("digest-1-1", "b"), ImageUser{}); }),
             8);
   connected.store_run(numbered_run(-3));
-  EXPECT_LT(measure_seconds([&] { connected.deliver_waiting_runs(); }), 1);
+  EXPECT_LT(measure_seconds([&] { connected.deliver_waiting(); }), 1);
   EXPECT_FALSE(connected.find_run_by_id("another"));
-  EXPECT_THAT(connected.last_offline_reason(), HasSubstr("has not answered for 2 s"));
-  EXPECT_THAT(connected.describe_spool_state(),
+  EXPECT_THAT(connected.offline_reason(), HasSubstr("has not answered for 2 s"));
+  EXPECT_THAT(connected.describe_state(),
               AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
                     HasSubstr("has not answered for 2 s")));
   Spool fresh = spool();
-  EXPECT_LT(measure_seconds([&] { fresh.check_runs_can_be_stored(); }), 8);
-  EXPECT_THAT(fresh.describe_spool_state(),
-              StartsWith("runs are queued in the spool, 1 waiting: "));
+  EXPECT_LT(measure_seconds([&] { fresh.check_can_store(); }), 8);
+  EXPECT_THAT(fresh.describe_state(), StartsWith("runs are queued in the spool, 1 waiting: "));
   server.thaw();
   deliver_to(3);
   // Once, even if several programs wait.
   Spool several = spool();
-  several.check_runs_can_be_stored();
+  several.check_can_store();
   server.freeze();
   for (int i = 4; i < 10; ++i) several.store_run(numbered_run(-i));
-  EXPECT_LT(measure_seconds([&] { several.deliver_waiting_runs(); }), 5);
-  EXPECT_THAT(several.describe_spool_state(),
+  EXPECT_LT(measure_seconds([&] { several.deliver_waiting(); }), 5);
+  EXPECT_THAT(several.describe_state(),
               AllOf(StartsWith("runs are queued in the spool, 6 waiting: "),
                     HasSubstr("has not answered for 2 s")));
   server.thaw();
@@ -397,13 +393,13 @@ TEST(Spool, DeliversAllRunsAfterServerStoppedDuringDelivery) {
     std::this_thread::sleep_for(std::chrono::milliseconds(150));
     server.stop();
   });
-  Spool(spool()).deliver_waiting_runs();
+  Spool(spool()).deliver_waiting();
   power.join();
   const std::size_t waiting = fresh.list_waiting_runs().size();
   server.start();
   EXPECT_GT(waiting, 0u) << "the server was stopped too late for this machine";
   for (int i = 0; i < 5 && !fresh.list_waiting_runs().empty(); ++i)
-    Spool(spool()).deliver_waiting_runs();
+    Spool(spool()).deliver_waiting();
   EXPECT_THAT(whole_runs(where), SizeIs(before + 209));
 }
 

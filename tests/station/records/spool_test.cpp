@@ -43,55 +43,53 @@ TEST(Spool, DeliversStoredRunsWhenRecordsBecomeReachable) {
   const TemporaryFolder folder;
   const std::string where = (folder / "away/records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_runs_can_be_stored();
-  EXPECT_THAT(spool.describe_spool_state(),
+  spool.check_can_store();
+  EXPECT_THAT(spool.describe_state(),
               AllOf(StartsWith("runs are queued in the spool: "), HasSubstr("records.db")));
   for (int i = 0; i < 3; ++i) spool.store_run(numbered_run(i));
-  spool.deliver_waiting_runs();
-  EXPECT_THAT(
-      spool.describe_spool_state(),
-      AllOf(StartsWith("runs are queued in the spool, 3 waiting: "), HasSubstr("records.db")));
+  spool.deliver_waiting();
+  EXPECT_THAT(spool.describe_state(), AllOf(StartsWith("runs are queued in the spool, 3 waiting: "),
+                                            HasSubstr("records.db")));
   EXPECT_EQ(spool.find_run_by_id(numbered_run(1).run)->camera, "camera-1");
   EXPECT_FALSE(spool.find_run_by_id("another"));
   // Checks continue with the locally known runs.
-  EXPECT_EQ(spool.find_run_of_other_camera_using_image("digest-2-7", "camera-1"),
+  EXPECT_EQ(spool.find_other_user("digest-2-7", "camera-1"),
             (ImageUser{"camera-2", numbered_run(2).run}));
-  EXPECT_EQ(spool.find_run_of_other_camera_using_image("digest-2-7", "camera-2"), ImageUser{});
-  EXPECT_THAT(spool.describe_spool_state(),
-              HasSubstr("; 1 images were not looked up in the records"));
+  EXPECT_EQ(spool.find_other_user("digest-2-7", "camera-2"), ImageUser{});
+  EXPECT_THAT(spool.describe_state(), HasSubstr("; 1 images were not looked up in the records"));
 
   fs::create_directory(folder / "away");
   Spool later(folder / "spool", where);
-  later.check_runs_can_be_stored();
-  EXPECT_EQ(later.describe_spool_state(), "");
+  later.check_can_store();
+  EXPECT_EQ(later.describe_state(), "");
   EXPECT_THAT(later.list_waiting_runs(), IsEmpty());
   EXPECT_THAT(whole_runs(where), SizeIs(3));
   EXPECT_EQ(Records(where).find_run_by_id(numbered_run(1).run)->metrics[0].value, 0.1 + 0.2);
-  EXPECT_EQ(later.find_run_of_other_camera_using_image("digest-2-7", "camera-1"),
+  EXPECT_EQ(later.find_other_user("digest-2-7", "camera-1"),
             (ImageUser{"camera-2", numbered_run(2).run}));
   // A voided run owns no image, also while its event waits.
   RunRecord voided_run = numbered_run(2);
   voided_run.events = {make_run_event_now(kVoided, "wrong serial", "Ann")};
   later.store_run(voided_run);
-  EXPECT_EQ(later.find_run_of_other_camera_using_image("digest-2-7", "camera-1"), ImageUser{});
-  later.deliver_waiting_runs();
-  EXPECT_EQ(later.find_run_of_other_camera_using_image("digest-2-7", "camera-1"), ImageUser{});
+  EXPECT_EQ(later.find_other_user("digest-2-7", "camera-1"), ImageUser{});
+  later.deliver_waiting();
+  EXPECT_EQ(later.find_other_user("digest-2-7", "camera-1"), ImageUser{});
 }
 
 TEST(Spool, FindGoldenRunUsingImageReturnsOnlyJudgedGoldenRuns) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_runs_can_be_stored();
+  spool.check_can_store();
   RunRecord golden = numbered_run(1), invalid = numbered_run(2);
   golden.kind = invalid.kind = "golden";
   invalid.verdict = "INVALID";
   for (const RunRecord& run : {numbered_run(0), golden, invalid}) spool.store_run(run);
   for (const std::string state : {"here", "in the records"}) {
-    EXPECT_EQ(spool.find_golden_run_using_image("digest-1-7"), golden.run) << state;
-    EXPECT_EQ(spool.find_golden_run_using_image("digest-0-7"), "") << "of a unit, " << state;
-    EXPECT_EQ(spool.find_golden_run_using_image("digest-2-7"), "") << "not judged, " << state;
-    spool.deliver_waiting_runs();
+    EXPECT_EQ(spool.find_golden_user("digest-1-7"), golden.run) << state;
+    EXPECT_EQ(spool.find_golden_user("digest-0-7"), "") << "of a unit, " << state;
+    EXPECT_EQ(spool.find_golden_user("digest-2-7"), "") << "not judged, " << state;
+    spool.deliver_waiting();
   }
   EXPECT_THAT(spool.list_waiting_runs(), IsEmpty());
 }
@@ -101,41 +99,41 @@ TEST(Spool, FindRunWithSameImagesReturnsJudgedRunWithSameImages) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_runs_can_be_stored();
+  spool.check_can_store();
   const RunRecord earlier = numbered_run(1);
   ASSERT_FALSE(earlier.is_verdict_invalid());
   RunRecord again = earlier;
   again.run = numbered_run(2).run;
   for (const std::string state : {"here", "in the records"}) {
     spool.store_run(earlier);
-    if (state != "here") spool.deliver_waiting_runs();
-    EXPECT_EQ(spool.find_run_with_same_images(again), earlier.run) << state;
-    EXPECT_EQ(spool.find_run_with_same_images(earlier), "") << "itself, " << state;
+    if (state != "here") spool.deliver_waiting();
+    EXPECT_EQ(spool.find_same_images(again), earlier.run) << state;
+    EXPECT_EQ(spool.find_same_images(earlier), "") << "itself, " << state;
     RunRecord fewer = again, other = again, camera = again, none = again;
     fewer.images.resize(kImagesOfARun / 2);
-    EXPECT_EQ(spool.find_run_with_same_images(fewer), earlier.run) << state;
+    EXPECT_EQ(spool.find_same_images(fewer), earlier.run) << state;
     other.images.back().sha256 = "another";
-    EXPECT_EQ(spool.find_run_with_same_images(other), "") << "one is new, " << state;
+    EXPECT_EQ(spool.find_same_images(other), "") << "one is new, " << state;
     other.images.back().rejection = "blurred";
-    EXPECT_EQ(spool.find_run_with_same_images(other), earlier.run) << "and not used, " << state;
+    EXPECT_EQ(spool.find_same_images(other), earlier.run) << "and not used, " << state;
     camera.camera = "another";
-    EXPECT_EQ(spool.find_run_with_same_images(camera), "") << state;
+    EXPECT_EQ(spool.find_same_images(camera), "") << state;
     none.images.clear();
-    EXPECT_EQ(spool.find_run_with_same_images(none), "") << state;
+    EXPECT_EQ(spool.find_same_images(none), "") << state;
   }
   // Images of a run that did not count can be used again.
   RunRecord voided_run = earlier;
   voided_run.events = {make_run_event_now(kVoided, "wrong lamps", "Ann")};
   spool.store_run(voided_run);
-  EXPECT_EQ(spool.find_run_with_same_images(again), "");
+  EXPECT_EQ(spool.find_same_images(again), "");
   RunRecord invalid = numbered_run(3), invalid_again = numbered_run(3);
-  invalid.set_verdict_from_causes({{"no captures.csv"}});
+  invalid.set_causes({{"no captures.csv"}});
   invalid_again.run = numbered_run(4).run;
   spool.store_run(invalid);
-  EXPECT_EQ(spool.find_run_with_same_images(invalid_again), "");
-  spool.deliver_waiting_runs();
-  EXPECT_EQ(spool.find_run_with_same_images(again), "");
-  EXPECT_EQ(spool.find_run_with_same_images(invalid_again), "");
+  EXPECT_EQ(spool.find_same_images(invalid_again), "");
+  spool.deliver_waiting();
+  EXPECT_EQ(spool.find_same_images(again), "");
+  EXPECT_EQ(spool.find_same_images(invalid_again), "");
 }
 
 /// A waiting run with later events is one run.
@@ -154,15 +152,15 @@ TEST(Spool, KeepsLaterEventsInWaitingRun) {
   run.events = {before.events[0], make_run_event_now(kHookDone, "")};
   spool.store_run(run);
   EXPECT_THAT(list_open_hooks(spool, "station-1"), IsEmpty());
-  spool.deliver_waiting_runs();
-  EXPECT_THAT(spool.describe_spool_state(), StartsWith("runs are queued in the spool, 1 waiting"));
+  spool.deliver_waiting();
+  EXPECT_THAT(spool.describe_state(), StartsWith("runs are queued in the spool, 1 waiting"));
   EXPECT_THAT(spool.list_waiting_runs(), SizeIs(1));
   EXPECT_THAT(spool.find_run_by_id(run.run)->events, SizeIs(3));
 
   fs::create_directory(folder / "away");
   Spool later(folder / "spool", where);
-  later.check_runs_can_be_stored();
-  EXPECT_EQ(later.describe_spool_state(), "");
+  later.check_can_store();
+  EXPECT_EQ(later.describe_state(), "");
   EXPECT_THAT(later.list_waiting_runs(), IsEmpty());
   EXPECT_THAT(whole_runs(where), SizeIs(1));
   const auto kept = later.find_run_by_id(run.run);
@@ -175,16 +173,15 @@ TEST(Spool, DeliversValidRunsDespiteInvalidDocumentInOutbox) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_runs_can_be_stored();
+  spool.check_can_store();
   for (int i = 1; i <= 2; ++i) spool.store_run(numbered_run(i));
   run_database_client((folder / "spool/outbox.db").string(),
                       "UPDATE runs SET document = '{}' WHERE camera = 'camera-1';\n");
-  spool.deliver_waiting_runs();
+  spool.deliver_waiting();
   EXPECT_EQ(whole_runs(where), std::set<std::string>{numbered_run(2).run});
-  EXPECT_THAT(
-      spool.describe_spool_state(),
-      AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
-            HasSubstr("outbox.db: run " + numbered_run(1).run + " is no run of a station: ")));
+  EXPECT_THAT(spool.describe_state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                                            HasSubstr("outbox.db: run " + numbered_run(1).run +
+                                                      " is no run of a station: ")));
 }
 
 TEST(Spool, RejectsOutboxThatIsNoDatabaseAndStoresRunInRecords) {
@@ -200,10 +197,10 @@ TEST(Spool, RejectsOutboxThatIsNoDatabaseAndStoresRunInRecords) {
     const auto names_cause =
         AllOf(HasSubstr("spool/outbox.db: "),
               testing::AnyOf(HasSubstr("is no regular file"), HasSubstr("not a database")));
-    EXPECT_THAT(rejection_message([&] { spool.check_runs_can_be_stored(); }), names_cause);
+    EXPECT_THAT(rejection_message([&] { spool.check_can_store(); }), names_cause);
     spool.store_run(numbered_run(1));
     EXPECT_THAT(whole_runs(where), SizeIs(1));
-    EXPECT_THAT(spool.describe_spool_state(), names_cause);
+    EXPECT_THAT(spool.describe_state(), names_cause);
   }
 }
 
@@ -217,20 +214,20 @@ TEST(Spool, KeepsEventStoredDuringDelivery) {
   ASSERT_TRUE(delivered);
   run.events = {make_run_event_now(kHookDone, "")};
   outbox.store_run(run, "elsewhere");
-  outbox.remove_delivered_run(*delivered);
+  outbox.remove_delivered(*delivered);
   const auto kept = outbox.find_run_by_id(run.run);
   ASSERT_TRUE(kept);
   EXPECT_THAT(kept->events, SizeIs(1));
-  outbox.remove_delivered_run(*kept);
+  outbox.remove_delivered(*kept);
   EXPECT_FALSE(outbox.find_run_by_id(run.run));
-  EXPECT_EQ(outbox.check_records_by_audit_trail("").entries, 0U);
+  EXPECT_EQ(outbox.check_trail("").entries, 0U);
 }
 
 TEST(Spool, StoresRunInRecordsWhenSpoolFolderCannotBeWritten) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder.file("spool", ""), where);
-  EXPECT_THAT(rejection_message([&] { spool.check_runs_can_be_stored(); }),
+  EXPECT_THAT(rejection_message([&] { spool.check_can_store(); }),
               HasSubstr("spool: cannot be made"));
   { const Records made(where); }
   spool.store_run(numbered_run(1));
@@ -247,41 +244,39 @@ TEST(Spool, DeliversEachRunOnlyToItsOwnDatabase) {
   { const Records made_a(a), made_b(b); }
   Spool of_a(folder / "spool", a), of_b(folder / "spool", b);
   of_a.store_run(numbered_run(1));
-  of_b.check_runs_can_be_stored();
+  of_b.check_can_store();
   EXPECT_THAT(whole_runs(b), IsEmpty());
-  EXPECT_THAT(of_b.describe_spool_state(),
+  EXPECT_THAT(of_b.describe_state(),
               AllOf(StartsWith("1 queued for another database"), HasSubstr("a.db")));
   EXPECT_THAT(of_b.list_waiting_runs(), IsEmpty());
   EXPECT_TRUE(of_b.find_run_by_id(numbered_run(1).run)) << "a run is not judged twice for that";
-  EXPECT_EQ(of_b.find_run_of_other_camera_using_image("digest-1-7", "b"),
-            (ImageUser{"camera-1", numbered_run(1).run}));
+  EXPECT_EQ(of_b.find_other_user("digest-1-7", "b"), (ImageUser{"camera-1", numbered_run(1).run}));
   of_b.store_run(numbered_run(2));
-  of_b.deliver_waiting_runs();
+  of_b.deliver_waiting();
   EXPECT_THAT(whole_runs(b), SizeIs(1));
   // The same records, by another name of the file.
-  Spool(folder / "spool", (folder / "spool/../a.db").string()).deliver_waiting_runs();
+  Spool(folder / "spool", (folder / "spool/../a.db").string()).deliver_waiting();
   EXPECT_EQ(whole_runs(a), std::set<std::string>{numbered_run(1).run});
-  EXPECT_EQ(of_b.describe_spool_state(), "");
+  EXPECT_EQ(of_b.describe_state(), "");
 }
 
 TEST(Spool, KeepsDifferentRunWithSameIdWaiting) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_runs_can_be_stored();
+  spool.check_can_store();
   spool.store_run(numbered_run(1));
-  spool.deliver_waiting_runs();
+  spool.deliver_waiting();
   spool.store_run(numbered_run(1));  // the same, as after a kill before its file was removed
-  spool.deliver_waiting_runs();
-  EXPECT_EQ(spool.describe_spool_state(), "");
+  spool.deliver_waiting();
+  EXPECT_EQ(spool.describe_state(), "");
   RunRecord again = numbered_run(1);
   again.ended_utc = "2026-11-21T14:50:01Z";
   spool.store_run(again);
   spool.store_run(numbered_run(2));
-  spool.deliver_waiting_runs();
-  EXPECT_THAT(spool.describe_spool_state(),
-              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
-                    HasSubstr("has another run " + again.run)));
+  spool.deliver_waiting();
+  EXPECT_THAT(spool.describe_state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                                            HasSubstr("has another run " + again.run)));
   EXPECT_THAT(whole_runs(where), SizeIs(2));
   EXPECT_EQ(Records(where).find_run_by_id(again.run)->ended_utc, numbered_run(1).ended_utc);
 }
@@ -292,13 +287,12 @@ TEST(Spool, CreatesDatabaseOnlyInCheckRunsCanBeStored) {
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
   spool.store_run(numbered_run(1));
-  spool.deliver_waiting_runs();
+  spool.deliver_waiting();
   EXPECT_FALSE(spool.find_run_by_id("another"));
-  EXPECT_THAT(spool.describe_spool_state(),
-              AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
-                    HasSubstr("records.db: there are no records")));
+  EXPECT_THAT(spool.describe_state(), AllOf(StartsWith("runs are queued in the spool, 1 waiting: "),
+                                            HasSubstr("records.db: there are no records")));
   EXPECT_FALSE(fs::exists(where));
-  Spool(folder / "spool", where).check_runs_can_be_stored();
+  Spool(folder / "spool", where).check_can_store();
   EXPECT_THAT(whole_runs(where), SizeIs(1));
 }
 
@@ -306,7 +300,7 @@ TEST(Spool, DeliversAllRunsOfConcurrentPrograms) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
-  spool.check_runs_can_be_stored();
+  spool.check_can_store();
   for (int i = 0; i < 25; ++i) spool.store_run(numbered_run(i));
   std::vector<pid_t> children;
   for (int program = 1; program <= 3; ++program) {
@@ -314,13 +308,13 @@ TEST(Spool, DeliversAllRunsOfConcurrentPrograms) {
       Spool own_spool(folder / "spool", where);
       for (int i = 0; i < 5; ++i) {
         own_spool.store_run(numbered_run(100 * program + i));
-        own_spool.deliver_waiting_runs();
+        own_spool.deliver_waiting();
       }
     }));
   }
   EXPECT_TRUE(end_well(children));
-  spool.deliver_waiting_runs();
-  EXPECT_EQ(spool.describe_spool_state(), "");
+  spool.deliver_waiting();
+  EXPECT_EQ(spool.describe_state(), "");
   EXPECT_THAT(whole_runs(where), SizeIs(40));
 }
 
@@ -353,7 +347,7 @@ TEST(Spool, ListsStoredAndWaitingRunsByFilter) {
   night.events = {make_run_event_now(kVoided, "wrong serial")};
   spool.store_run(night);
   EXPECT_EQ(spool.list_run_summaries({})[0].voided, "wrong serial");
-  spool.deliver_waiting_runs();
+  spool.deliver_waiting();
   expect_three(spool);
   EXPECT_EQ(spool.list_run_summaries({})[0].voided, "wrong serial");
   EXPECT_THAT(spool.list_run_summaries({}).back().causes, Not(StartsWith("(waits here) ")));

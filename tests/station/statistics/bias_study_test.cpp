@@ -49,7 +49,7 @@ std::vector<ReferenceValue> linearity_example() {
 /// The regression of the manual and of SPC for Excel's worked example of it ("Linearity and Bias
 /// Study", its biases with the sample's standard deviation), to their printed digits.
 TEST(BiasStudy, LinearityMatchesExampleOfAiagManual) {
-  const BiasStudy study = analyze_bias_and_linearity(linearity_example());
+  const BiasStudy study = analyze_bias(linearity_example());
   ASSERT_TRUE(study.linearity);
   const Linearity& line = *study.linearity;
   EXPECT_NEAR(line.slope.value, -0.131667, 5e-7);
@@ -63,7 +63,7 @@ TEST(BiasStudy, LinearityMatchesExampleOfAiagManual) {
   EXPECT_NEAR(line.intercept.low, 0.591, 5e-4);
   EXPECT_NEAR(line.intercept.high, 0.882, 5e-4);
   EXPECT_LT(line.slope.p, 5e-4);
-  EXPECT_TRUE(line.slope.differs_significantly_from_zero());
+  EXPECT_TRUE(line.slope.is_significant());
   EXPECT_NEAR(line.residual_sd, 0.240, 5e-4);
   EXPECT_NEAR(100 * line.r_squared, 71.43, 0.005);
   EXPECT_EQ(line.slope.dof, 58);
@@ -84,7 +84,7 @@ TEST(BiasStudy, LinearityMatchesExampleOfAiagManual) {
                 printed[i].standard_error > 0.1 ? 5e-4 : 5e-5);
     EXPECT_NEAR(bias.t, printed[i].t, std::abs(printed[i].t) < 1 ? 5e-4 : 0.005);
     EXPECT_NEAR(bias.p, printed[i].p, 5e-4);
-    EXPECT_EQ(bias.differs_significantly_from_zero(), printed[i].p < 0.05);
+    EXPECT_EQ(bias.is_significant(), printed[i].p < 0.05);
     EXPECT_EQ(study.units[i].reference, 2 * (static_cast<double>(i) + 1));
     EXPECT_EQ(study.units[i].count, 12U);
   }
@@ -95,18 +95,18 @@ TEST(BiasStudy, LinearityMatchesExampleOfAiagManual) {
   EXPECT_NEAR(study.overall_bias.p, 0.089, 5e-4);
   EXPECT_NEAR(study.overall_bias.low, -0.1152, 1e-4);
   EXPECT_NEAR(study.overall_bias.high, 0.0085, 1e-4);
-  EXPECT_FALSE(study.overall_bias.differs_significantly_from_zero());
+  EXPECT_FALSE(study.overall_bias.is_significant());
   // Narrowest at the mean. At both ends 0 is outside the band, as in the manual's figure.
-  EXPECT_LT(line.confidence_half_width_at(6), line.confidence_half_width_at(2));
-  EXPECT_NEAR(line.confidence_half_width_at(2), line.confidence_half_width_at(10), 1e-12);
-  EXPECT_GT(line.predict_bias_at(2), line.confidence_half_width_at(2));
-  EXPECT_LT(line.predict_bias_at(10), -line.confidence_half_width_at(10));
+  EXPECT_LT(line.half_width_at(6), line.half_width_at(2));
+  EXPECT_NEAR(line.half_width_at(2), line.half_width_at(10), 1e-12);
+  EXPECT_GT(line.predict_bias_at(2), line.half_width_at(2));
+  EXPECT_LT(line.predict_bias_at(10), -line.half_width_at(10));
 }
 
 /// AIAG, Measurement Systems Analysis, 4th ed., the independent sample method: 15 readings of a
 /// part of 6.00.
 TEST(BiasStudy, BiasMatchesExampleOfAiagManual) {
-  const BiasStudy study = analyze_bias_and_linearity(values_of_unit(
+  const BiasStudy study = analyze_bias(values_of_unit(
       "part", 6, {5.8, 5.7, 5.9, 5.9, 6.0, 6.1, 6.0, 6.1, 6.4, 6.3, 6.0, 6.1, 6.2, 5.6, 6.0}));
   ASSERT_THAT(study.units, SizeIs(1));
   const UnitBias& part = study.units[0];
@@ -118,29 +118,28 @@ TEST(BiasStudy, BiasMatchesExampleOfAiagManual) {
   EXPECT_NEAR(part.bias.t, 0.1218, 5e-5);
   EXPECT_NEAR(part.bias.low, -0.1107, 1e-4);
   EXPECT_NEAR(part.bias.high, 0.1241, 5e-5);
-  EXPECT_FALSE(part.bias.differs_significantly_from_zero());
+  EXPECT_FALSE(part.bias.is_significant());
   EXPECT_FALSE(study.linearity) << "of one reference";
 }
 
 TEST(BiasStudy, PValueIsZeroForConstantBiasAndOneWithoutBias) {
-  const BiasStudy study = analyze_bias_and_linearity(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
+  const BiasStudy study = analyze_bias(values_of_unit("a", 1, {1.5, 1.5, 1.5}));
   EXPECT_EQ(study.overall_bias.p, 0);
   EXPECT_EQ(study.overall_bias.t, std::numeric_limits<double>::infinity());
   EXPECT_EQ(study.overall_bias.low, 0.5);
-  EXPECT_TRUE(study.overall_bias.differs_significantly_from_zero());
+  EXPECT_TRUE(study.overall_bias.is_significant());
   // Ten times 0.9 does not add up to 9.
-  const BiasStudy none =
-      analyze_bias_and_linearity(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
+  const BiasStudy none = analyze_bias(values_of_unit("a", 0.9, std::vector<double>(10, 0.9)));
   EXPECT_EQ(none.units[0].bias.value, 0);
   EXPECT_EQ(none.units[0].bias.p, 1);
   EXPECT_EQ(none.overall_bias.p, 1);
 }
 
 TEST(BiasStudy, ThrowsWithoutValuesOrForUnitWithOneRun) {
-  EXPECT_THAT(rejection_message<std::invalid_argument>([] { analyze_bias_and_linearity({}); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([] { analyze_bias({}); }),
               HasSubstr("needs runs of reference units"));
   EXPECT_THAT(rejection_message<std::invalid_argument>([] {
-                analyze_bias_and_linearity({{"a", 1, 1}, {"a", 1, 2}, {"b", 2, 2}});
+                analyze_bias({{"a", 1, 1}, {"a", 1, 2}, {"b", 2, 2}});
               }),
               HasSubstr("unit b has one run: a bias study needs two or more of each"));
 }
@@ -148,12 +147,12 @@ TEST(BiasStudy, ThrowsWithoutValuesOrForUnitWithOneRun) {
 TEST(WriteBiasPlot, ShowsBandForLinearityOnly) {
   const TemporaryFolder folder;
   const auto values = linearity_example();
-  write_bias_plot(folder / "bias.svg", "tilt_deg", values, analyze_bias_and_linearity(values));
+  write_bias_plot(folder / "bias.svg", "tilt_deg", values, analyze_bias(values));
   EXPECT_THAT(TemporaryFolder::read_content(folder / "bias.svg"),
               AllOf(HasSubstr("<svg"), HasSubstr("95 % band"), HasSubstr("no bias"),
                     HasSubstr("tilt_deg, measured - reference")));
   const auto one = values_of_unit("a", 1, {1.5, 1.4});
-  write_bias_plot(folder / "one.svg", "tilt_deg", one, analyze_bias_and_linearity(one));
+  write_bias_plot(folder / "one.svg", "tilt_deg", one, analyze_bias(one));
   EXPECT_THAT(TemporaryFolder::read_content(folder / "one.svg"), testing::Not(HasSubstr("band")));
 }
 

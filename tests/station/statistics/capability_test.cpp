@@ -26,25 +26,25 @@ TEST(ComputeCpkIndex, IntervalMatchesBissellFormula) {
   EXPECT_NEAR(cpk.value - cpk.low, 1.959964 / std::sqrt(450), 1e-7);
 }
 
-TEST(ComputeProcessCapability, DriftReducesPpkButNotCpk) {
+TEST(ComputeCapability, DriftReducesPpkButNotCpk) {
   std::vector<double> values;
   for (int i = 0; i < 40; ++i) values.push_back((i % 2 == 0 ? 0.9 : 1.1) + 0.05 * i);
-  const auto found = compute_process_capability(values, {std::nullopt, 5});
+  const auto found = compute_capability(values, {std::nullopt, 5});
   ASSERT_TRUE(found);
   EXPECT_FALSE(found->cp);
   EXPECT_NEAR(found->mean, 1 + 0.05 * 19.5, 1e-12);
   // Moving ranges 0.25 and 0.15, 20 and 19 times.
   EXPECT_NEAR(found->within_sd, (20 * 0.25 + 19 * 0.15) / 39 / 1.128, 1e-12);
   EXPECT_GT(found->cpk.value, 3 * found->ppk.value);
-  const auto two = compute_process_capability(values, {-1, 5});
+  const auto two = compute_capability(values, {-1, 5});
   ASSERT_TRUE(two->pp);
   EXPECT_NEAR(two->pp->value, 6 / (6 * two->overall_sd), 1e-12);
 }
 
-TEST(ComputeProcessCapability, ReturnsNulloptForEqualValuesOrWithoutLimits) {
-  EXPECT_FALSE(compute_process_capability(std::vector<double>{1}, {0, 2}));
-  EXPECT_FALSE(compute_process_capability(std::vector<double>{1, 1, 1}, {0, 2}));
-  EXPECT_FALSE(compute_process_capability(std::vector<double>{1, 2}, {}));
+TEST(ComputeCapability, ReturnsNulloptForEqualValuesOrWithoutLimits) {
+  EXPECT_FALSE(compute_capability(std::vector<double>{1}, {0, 2}));
+  EXPECT_FALSE(compute_capability(std::vector<double>{1, 1, 1}, {0, 2}));
+  EXPECT_FALSE(compute_capability(std::vector<double>{1, 2}, {}));
 }
 
 }  // namespace

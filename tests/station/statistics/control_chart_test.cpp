@@ -25,7 +25,7 @@ std::vector<std::size_t> find_indices(const std::vector<ChartAlarm>& alarms) {
 }
 
 bool matches(const std::string& name, const std::vector<double>& sigmas) {
-  for (const ChartRule& rule : list_control_chart_rules()) {
+  for (const ChartRule& rule : list_chart_rules()) {
     if (rule.name == name) return rule.matches(sigmas);
   }
   ADD_FAILURE() << "no rule " << name;
@@ -47,15 +47,15 @@ std::vector<double> with(std::vector<double> values, std::size_t place, double v
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.2: flow rates of ten batches.
-TEST(ComputeControlChart, MatchesPublishedIndividualsChartOfNist) {
+TEST(MakeControlChart, MatchesPublishedIndividualsChartOfNist) {
   const std::vector<double> flow{49.6, 47.6, 49.9, 51.3, 47.8, 51.2, 52.6, 52.4, 53.6, 52.1};
-  const ControlChart chart = compute_control_chart(flow);
+  const ControlChart chart = make_control_chart(flow);
   constexpr double printed = 5e-5;
   EXPECT_NEAR(chart.mean, 50.81, printed);
   EXPECT_NEAR(chart.sigma * 1.128, 1.8778, printed);
   EXPECT_NEAR(chart.upper, 55.8041, printed);
   EXPECT_NEAR(chart.lower, 45.8159, printed);
-  EXPECT_THAT(find_control_chart_alarms(flow, {"western-electric-1"}), IsEmpty());
+  EXPECT_THAT(list_chart_alarms(flow, {"western-electric-1"}), IsEmpty());
 }
 
 /// NIST/SEMATECH e-Handbook of Statistical Methods, 6.3.2.4.
@@ -79,7 +79,7 @@ struct RuleCase {
   std::vector<double> matches, fails;
 };
 
-TEST(ListControlChartRules, RulesMatchOnlyTheirPatternEndingAtLastValue) {
+TEST(ListChartRules, RulesMatchOnlyTheirPatternEndingAtLastValue) {
   const std::vector<double> up{-0.4, -0.2, 0, 0.1, 0.2, 0.3};
   const std::vector<RuleCase> cases{
       {"western-electric-1", {3.01}, {3}},
@@ -111,47 +111,46 @@ TEST(ListControlChartRules, RulesMatchOnlyTheirPatternEndingAtLastValue) {
   }
 }
 
-TEST(FindControlChartAlarms, ReportsShiftOfMeanInsideLimits) {
+TEST(ListChartAlarms, ReportsShiftOfMeanInsideLimits) {
   std::vector<double> values;
   for (int i = 0; i < 24; ++i) values.push_back((i % 2 == 0 ? 1.0 : 1.1) + (i < 12 ? 0 : 0.3));
-  EXPECT_THAT(find_control_chart_alarms(values, {"western-electric-1"}), IsEmpty());
+  EXPECT_THAT(list_chart_alarms(values, {"western-electric-1"}), IsEmpty());
   // From the eighth on, the first twelve values are also eight in a row below the mean.
-  EXPECT_THAT(find_indices(find_control_chart_alarms(values, {"western-electric-4"})),
+  EXPECT_THAT(find_indices(list_chart_alarms(values, {"western-electric-4"})),
               ElementsAre(7, 8, 9, 10, 11, 19, 20, 21, 22, 23));
-  const auto by_average = find_control_chart_alarms(values, {"ewma"});
+  const auto by_average = list_chart_alarms(values, {"ewma"});
   ASSERT_FALSE(by_average.empty());
   EXPECT_EQ(by_average.back().index, 23u);
 }
 
-TEST(FindControlChartAlarms, AppliesAllRulesOfNamedSets) {
+TEST(ListChartAlarms, AppliesAllRulesOfNamedSets) {
   const std::vector<double> values{0, 0.1, 0, 0.1, 0, 0.1, 0, 0.1, 5};
   std::vector<std::string> names;
   for (const ChartAlarm& alarm :
-       find_control_chart_alarms(values, {"western-electric", "nelson-1", "ewma"})) {
+       list_chart_alarms(values, {"western-electric", "nelson-1", "ewma"})) {
     if (alarm.index == 8) names.push_back(alarm.rule);
   }
   EXPECT_THAT(names, ElementsAre("western-electric-1", "nelson-1", "ewma"));
-  EXPECT_THAT(rejection_message<std::invalid_argument>(
-                  [&] { find_control_chart_alarms(values, {"western"}); }),
-              HasSubstr("there is no rule western; the rules are western-electric-1 to -4"));
+  EXPECT_THAT(
+      rejection_message<std::invalid_argument>([&] { list_chart_alarms(values, {"western"}); }),
+      HasSubstr("there is no rule western; the rules are western-electric-1 to -4"));
 }
 
-TEST(FindControlChartAlarms, ReturnsNoneForEqualValues) {
+TEST(ListChartAlarms, ReturnsNoneForEqualValues) {
   for (const double value : {1.0, 0.1, 0.3, 1e-7}) {
     const std::vector<double> values(20, value);  // more than any rule uses
-    EXPECT_EQ(compute_control_chart(values).mean, value);
-    EXPECT_THAT(find_control_chart_alarms(values, {"western-electric", "nelson", "ewma"}),
-                IsEmpty());
+    EXPECT_EQ(make_control_chart(values).mean, value);
+    EXPECT_THAT(list_chart_alarms(values, {"western-electric", "nelson", "ewma"}), IsEmpty());
   }
 }
 
-TEST(FindControlChartAlarms, CountsValueAtMeanOnNeitherSide) {
+TEST(ListChartAlarms, CountsValueAtMeanOnNeitherSide) {
   // Mean 1: seven below it, one at it, seven above.
   std::vector<double> values(7, 0.5);
   values.push_back(1);
   values.insert(values.end(), 7, 1.5);
-  EXPECT_EQ(compute_control_chart(values).mean, 1);
-  EXPECT_THAT(find_control_chart_alarms(values, {"western-electric-4"}), IsEmpty());
+  EXPECT_EQ(make_control_chart(values).mean, 1);
+  EXPECT_THAT(list_chart_alarms(values, {"western-electric-4"}), IsEmpty());
 }
 
 TEST(WriteTrendPlot, ShowsAlarmsAndGateOnlyIfGiven) {

@@ -29,8 +29,8 @@ std::vector<StudyValue> crossed(std::size_t stations, std::size_t repeats,
 
 /// AIAG, Measurement Systems Analysis, 4th ed., tables III-B 6 (values), A 3 (analysis of variance)
 /// and A 4 (parts of the variation): 10 parts, 3 appraisers, 3 trials.
-TEST(AnalyzeRepeatabilityAndReproducibility, MatchesGaugeStudyOfAiagManual) {
-  const MeasurementStudy study = analyze_repeatability_and_reproducibility(
+TEST(AnalyzeStudy, MatchesGaugeStudyOfAiagManual) {
+  const MeasurementStudy study = analyze_study(
       crossed(3, 3, {0.29,  0.41,  0.64,  0.08,  0.25,  0.07,  0.04,  -0.11, -0.15,     // 1
                      -0.56, -0.68, -0.58, -0.47, -1.22, -0.68, -1.38, -1.13, -0.96,     // 2
                      1.34,  1.17,  1.27,  1.19,  0.94,  1.34,  0.88,  1.09,  0.67,      // 3
@@ -65,13 +65,13 @@ TEST(AnalyzeRepeatabilityAndReproducibility, MatchesGaugeStudyOfAiagManual) {
   EXPECT_NEAR(100 * study.repeatability / study.total, 18.4, 0.05);
   EXPECT_NEAR(100 * study.station_sd / study.total, 20.9, 0.05);
   EXPECT_NEAR(100 * study.unit_sd / study.total, 96.0, 0.05);
-  EXPECT_EQ(study.compute_number_of_distinct_categories(), 4);
+  EXPECT_EQ(study.count_distinct_categories(), 4);
 }
 
 /// Values of the same equations in NumPy and SciPy, because none are published.
-TEST(AnalyzeRepeatabilityAndReproducibility, DoesNotPoolSignificantInteraction) {
-  const MeasurementStudy study = analyze_repeatability_and_reproducibility(
-      crossed(2, 2, {10, 10.2, 12, 12.2, 11, 11.4, 10, 10.4, 15, 15.2, 14, 14.6}));
+TEST(AnalyzeStudy, DoesNotPoolSignificantInteraction) {
+  const MeasurementStudy study =
+      analyze_study(crossed(2, 2, {10, 10.2, 12, 12.2, 11, 11.4, 10, 10.4, 15, 15.2, 14, 14.6}));
   EXPECT_FALSE(study.pooled);
   EXPECT_NEAR(*study.interaction_p, 0.0002923805372109052, 1e-12);
   EXPECT_NEAR(std::pow(study.repeatability, 2), 0.06666666666666661, 1e-12);
@@ -82,47 +82,40 @@ TEST(AnalyzeRepeatabilityAndReproducibility, DoesNotPoolSignificantInteraction) 
 }
 
 /// By hand: two units at 0 and 10, each measured twice, 1 apart: MS_e = 0.5, MS_unit = 100.
-TEST(AnalyzeRepeatabilityAndReproducibility, ComputesRepeatabilityForOneStation) {
-  const MeasurementStudy study =
-      analyze_repeatability_and_reproducibility(crossed(1, 2, {-0.5, 0.5, 9.5, 10.5}));
+TEST(AnalyzeStudy, ComputesRepeatabilityForOneStation) {
+  const MeasurementStudy study = analyze_study(crossed(1, 2, {-0.5, 0.5, 9.5, 10.5}));
   EXPECT_EQ(study.stations, 1u);
   EXPECT_FALSE(study.interaction_p);
   EXPECT_DOUBLE_EQ(study.repeatability, std::sqrt(0.5));
   EXPECT_EQ(study.station_sd, 0);
   EXPECT_DOUBLE_EQ(study.unit_sd, std::sqrt((100 - 0.5) / 2));
-  EXPECT_EQ(study.compute_number_of_distinct_categories(),
-            static_cast<int>(1.41 * std::sqrt(99.5)));
+  EXPECT_EQ(study.count_distinct_categories(), static_cast<int>(1.41 * std::sqrt(99.5)));
   const double sd = std::sqrt(0.5);
-  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({}));
-  EXPECT_DOUBLE_EQ(*study.compute_precision_to_tolerance_percent({0, 20}), 100 * 6 * sd / 20);
-  EXPECT_DOUBLE_EQ(*study.compute_precision_to_tolerance_percent({std::nullopt, 11}),
-                   100 * 3 * sd / 6);
-  EXPECT_DOUBLE_EQ(*study.compute_precision_to_tolerance_percent({1, std::nullopt}),
-                   100 * 3 * sd / 4);
+  EXPECT_FALSE(study.precision_to_tolerance_percent({}));
+  EXPECT_DOUBLE_EQ(*study.precision_to_tolerance_percent({0, 20}), 100 * 6 * sd / 20);
+  EXPECT_DOUBLE_EQ(*study.precision_to_tolerance_percent({std::nullopt, 11}), 100 * 3 * sd / 6);
+  EXPECT_DOUBLE_EQ(*study.precision_to_tolerance_percent({1, std::nullopt}), 100 * 3 * sd / 4);
   // The mean, 5, is at the one limit or beyond it.
-  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({std::nullopt, 5}));
-  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({std::nullopt, 1}));
-  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({5, std::nullopt}));
-  EXPECT_FALSE(study.compute_precision_to_tolerance_percent({11, std::nullopt}));
+  EXPECT_FALSE(study.precision_to_tolerance_percent({std::nullopt, 5}));
+  EXPECT_FALSE(study.precision_to_tolerance_percent({std::nullopt, 1}));
+  EXPECT_FALSE(study.precision_to_tolerance_percent({5, std::nullopt}));
+  EXPECT_FALSE(study.precision_to_tolerance_percent({11, std::nullopt}));
 }
 
-TEST(AnalyzeRepeatabilityAndReproducibility, ThrowsForMissingOrUnbalancedValues) {
-  EXPECT_THAT(rejection_message<std::invalid_argument>(
-                  [] { analyze_repeatability_and_reproducibility({}); }),
+TEST(AnalyzeStudy, ThrowsForMissingOrUnbalancedValues) {
+  EXPECT_THAT(rejection_message<std::invalid_argument>([] { analyze_study({}); }),
               HasSubstr("two units"));
   EXPECT_THAT(rejection_message<std::invalid_argument>([] {
-                analyze_repeatability_and_reproducibility(crossed(1, 1, {1, 2}));
+                analyze_study(crossed(1, 1, {1, 2}));
               }),
               HasSubstr("two or more"));
   auto values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
   values.pop_back();
-  EXPECT_THAT(rejection_message<std::invalid_argument>(
-                  [&] { analyze_repeatability_and_reproducibility(values); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { analyze_study(values); }),
               HasSubstr("unit 101 has 1 runs on 1, 100 has 2 on 0"));
   values = crossed(2, 2, {1, 2, 3, 4, 5, 6, 7, 8});
   values.erase(values.begin(), values.begin() + 2);
-  EXPECT_THAT(rejection_message<std::invalid_argument>(
-                  [&] { analyze_repeatability_and_reproducibility(values); }),
+  EXPECT_THAT(rejection_message<std::invalid_argument>([&] { analyze_study(values); }),
               HasSubstr("unit 100 has 0 runs on 0, 100 has 2 on 1"));
 }
 

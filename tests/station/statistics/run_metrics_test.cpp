@@ -58,40 +58,39 @@ TEST_F(RunMetrics, FindGateLimitPrefersStationToLastRun) {
   station.gates = {{"rms_px", 0.7}};
   EXPECT_EQ(find_gate_limit("rms_px", &station, records, judged()), 0.7);
   EXPECT_FALSE(find_gate_limit("tilt_deg", &station, records, judged()));
-  EXPECT_EQ(make_tolerance_limits(find_run_metric_kind("rms_px"), 0.7).upper, 0.7);
-  EXPECT_FALSE(make_tolerance_limits(find_run_metric_kind("rms_px"), 0.7).lower);
-  EXPECT_EQ(make_tolerance_limits(find_run_metric_kind("coverage"), 0.7).lower, 0.7);
+  EXPECT_EQ(make_specification_limits(require_run_metric_kind("rms_px"), 0.7).upper, 0.7);
+  EXPECT_FALSE(make_specification_limits(require_run_metric_kind("rms_px"), 0.7).lower);
+  EXPECT_EQ(make_specification_limits(require_run_metric_kind("coverage"), 0.7).lower, 0.7);
 }
 
-using CheckValuesAreOfOneStation = RunMetrics;
+using CheckOneStation = RunMetrics;
 
-TEST_F(CheckValuesAreOfOneStation, ThrowsForTwoStations) {
+TEST_F(CheckOneStation, ThrowsForTwoStations) {
   auto points = judged();
-  EXPECT_NO_THROW(check_values_are_of_one_station(points));
-  EXPECT_NO_THROW(check_values_are_of_one_station({}));
+  EXPECT_NO_THROW(check_one_station(points));
+  EXPECT_NO_THROW(check_one_station({}));
   points[1].station = "station-2";
-  EXPECT_THROW(check_values_are_of_one_station(points), std::invalid_argument);
+  EXPECT_THROW(check_one_station(points), std::invalid_argument);
 }
 
 TEST_F(RunMetrics, SelectValuesOfStudyUnitsReturnsRequestedOrRepeatedlyMeasuredUnits) {
-  EXPECT_THAT(select_values_of_study_units(judged(), {}),
+  EXPECT_THAT(select_study_values(judged(), {}),
               AllOf(SizeIs(2), testing::Each(Field(&StudyValue::unit, "a"))));
-  EXPECT_THAT(select_values_of_study_units(judged(), {"b"}),
-              ElementsAre(Field(&StudyValue::unit, "b")));
+  EXPECT_THAT(select_study_values(judged(), {"b"}), ElementsAre(Field(&StudyValue::unit, "b")));
   EXPECT_THAT(
       [&] {
-        select_values_of_study_units(judged(), {"c", "a", "d"});
+        select_study_values(judged(), {"c", "a", "d"});
       },
       testing::ThrowsMessage<std::invalid_argument>(HasSubstr("is of: c, d")));
-  const auto values = select_values_of_reference_units(judged(), {{"a", 0.2}});
+  const auto values = select_reference_values(judged(), {{"a", 0.2}});
   ASSERT_THAT(values, SizeIs(2));
   EXPECT_EQ(values[0].reference, 0.2);
-  EXPECT_THROW(select_values_of_reference_units(judged(), {{"c", 0.2}}), std::invalid_argument);
+  EXPECT_THROW(select_reference_values(judged(), {{"c", 0.2}}), std::invalid_argument);
 }
 
-TEST(FindRunMetricKind, ThrowsNamingKnownMetrics) {
-  EXPECT_STREQ(find_run_metric_kind("check_mean_mm").unit, "mm");
-  EXPECT_THAT([] { find_run_metric_kind("rms_um"); },
+TEST(RequireRunMetricKind, ThrowsNamingKnownMetrics) {
+  EXPECT_STREQ(require_run_metric_kind("check_mean_mm").unit, "mm");
+  EXPECT_THAT([] { require_run_metric_kind("rms_um"); },
               testing::ThrowsMessage<std::invalid_argument>(
                   AllOf(HasSubstr("there is no metric rms_um"), HasSubstr("rms_px"))));
 }
@@ -99,37 +98,36 @@ TEST(FindRunMetricKind, ThrowsNamingKnownMetrics) {
 /// sample() has the same images in each run.
 TEST_F(RunMetrics, CheckRunsShareNoImagesThrowsForSameImages) {
   const auto points = judged();
-  const auto values = select_values_of_study_units(points, {});
+  const auto values = select_study_values(points, {});
   ASSERT_THAT(values, SizeIs(2));
   EXPECT_THAT(rejection_message<std::invalid_argument>(
-                  [&] { check_runs_share_no_images(records, points, values); }),
+                  [&] { check_no_shared_images(records, points, values); }),
               HasSubstr("runs " + numbered_run_id(1) + " and " + numbered_run_id(3) +
                         " of camera a have the same images, which is no repetition"));
   EXPECT_EQ(rejection_message<std::invalid_argument>([&] {
-              check_runs_share_no_images(records, points,
-                                         select_values_of_study_units(points, {"b"}));
+              check_no_shared_images(records, points, select_study_values(points, {"b"}));
             }),
             "");
 }
 
-TEST(CountRunsByVerdict, ExcludesVoidedRunsFromYield) {
+TEST(CountRuns, ExcludesVoidedRunsFromYield) {
   const std::vector<RunSummary> runs{{"1", "unit", "", "", "", "PASS", "", ""},
                                      {"2", "unit", "", "", "", "PASS", "", ""},
                                      {"3", "unit", "", "", "", "FAIL", "", ""},
                                      {"4", "unit", "", "", "", "FAIL", "", "wrong serial"},
                                      {"5", "unit", "", "", "", "INVALID", "", ""},
                                      {"6", "golden", "", "", "", "PASS", "", ""}};
-  const RunCounts counts = count_runs_by_verdict(runs);
+  const RunCounts counts = count_runs(runs);
   EXPECT_EQ(counts.passed, 3U);
   EXPECT_EQ(counts.failed, 1U);
   EXPECT_EQ(counts.invalid, 1U);
   EXPECT_EQ(counts.voided, 1U);
   EXPECT_EQ(counts.units_judged, 3U);
   EXPECT_DOUBLE_EQ(counts.compute_yield().value(), 2.0 / 3);
-  EXPECT_FALSE(count_runs_by_verdict({}).compute_yield());
+  EXPECT_FALSE(count_runs({}).compute_yield());
 }
 
-TEST(CountRunsByVerdict, CountsReworkedCamerasAndFirstPassYield) {
+TEST(CountRuns, CountsReworkedCamerasAndFirstPassYield) {
   const std::vector<RunSummary> runs{{"1", "unit", "", "a", "", "PASS", "", ""},
                                      {"2", "unit", "", "b", "", "FAIL", "", ""},
                                      {"3", "unit", "", "b", "", "PASS", "", ""},
@@ -137,11 +135,11 @@ TEST(CountRunsByVerdict, CountsReworkedCamerasAndFirstPassYield) {
                                      {"5", "unit", "", "c", "", "PASS", "", ""},
                                      {"6", "unit", "", "d", "", "FAIL", "", "wrong serial"},
                                      {"7", "golden", "", "g", "", "FAIL", "", ""}};
-  const RunCounts counts = count_runs_by_verdict(runs);
+  const RunCounts counts = count_runs(runs);
   EXPECT_EQ(counts.cameras, 3U);
   EXPECT_EQ(counts.cameras_reworked, 1U);
   EXPECT_DOUBLE_EQ(counts.compute_first_pass_yield().value(), 2.0 / 3);
-  EXPECT_FALSE(count_runs_by_verdict({}).compute_first_pass_yield());
+  EXPECT_FALSE(count_runs({}).compute_first_pass_yield());
 }
 
 }  // namespace

@@ -29,7 +29,7 @@ TEST_F(LampFaults, DescribeLampMapFaultsNamesSwappedLamps) {
     for (std::size_t b = a + 1; b < map.lamps.size(); ++b) {
       LampMap swapped = map;
       std::swap(swapped.lamps[a].position_m, swapped.lamps[b].position_m);
-      const auto faults = describe_lamp_map_faults(frames, swapped, calibration);
+      const auto faults = list_lamp_map_faults(frames, swapped, calibration);
       ASSERT_EQ(faults.size(), 1u) << a << " " << b;
       EXPECT_THAT(faults[0], HasSubstr(std::to_string(map.lamps[a].id) + " and " +
                                        std::to_string(map.lamps[b].id) + " seem to be swapped"));
@@ -41,7 +41,7 @@ TEST_F(LampFaults, DescribeLampMapFaultsNamesDisplacedLampAndDisplacement) {
   for (std::size_t i = 0; i < map.lamps.size(); ++i) {
     LampMap moved = map;
     moved.lamps[i].position_m += Eigen::Vector3d(0.02, -0.01, 0);
-    EXPECT_THAT(describe_lamp_map_faults(frames, moved, calibration),
+    EXPECT_THAT(list_lamp_map_faults(frames, moved, calibration),
                 ElementsAre("lamp " + std::to_string(map.lamps[i].id) +
                             " hangs 22 mm from where the map has it (x -20 mm, y +10 mm): moved, "
                             "or entered wrongly"));
@@ -53,12 +53,11 @@ TEST_F(LampFaults, DescribeMissingLampsNamesNeverVisibleLamp) {
   for (Frame& frame : frames) {
     std::erase_if(frame.detections, [&](const Detection& lamp) { return lamp.lamp == id; });
   }
-  EXPECT_THAT(describe_missing_lamps(frames, map),
+  EXPECT_THAT(list_missing_lamps(frames, map),
               ElementsAre(HasSubstr("lamp " + std::to_string(id) + " is never visible")));
-  EXPECT_THAT(describe_lamp_map_faults(frames, map, calibration), IsEmpty())
+  EXPECT_THAT(list_lamp_map_faults(frames, map, calibration), IsEmpty())
       << "it does not contradict the map";
-  EXPECT_THAT(describe_missing_lamps(std::span(frames).first(2), map), IsEmpty())
-      << "too few to tell";
+  EXPECT_THAT(list_missing_lamps(std::span(frames).first(2), map), IsEmpty()) << "too few to tell";
 }
 
 /// A light that is mistaken for a lamp is rejected, and its capture has a large residual. That does
@@ -75,7 +74,7 @@ TEST_F(LampFaults, DescribeLampMapFaultsNamesLampOnlyForManyContradictingCapture
   ASSERT_GT(seen.size(), 20u);
   const std::size_t tenth = seen.size() / 10;
   for (std::size_t i = 0; i < seen.size(); ++i) {
-    const auto faults = describe_lamp_map_faults(frames, map, calibration, fits_px);
+    const auto faults = list_lamp_map_faults(frames, map, calibration, fits_px);
     if (i > tenth) {
       EXPECT_THAT(faults, ElementsAre(HasSubstr("lamp " + std::to_string(id) + " contradicts")))
           << i;
@@ -107,7 +106,7 @@ TEST_F(PlaceFault, DescribeWrongReferencePositionsNamesSeveralWrongCaptures) {
   CapturesTable wrong = places;
   for (std::size_t i = 0; i < 5; ++i) wrong.at(frames[i].image).y_m.value() += 0.052;
   wrong.at(frames[9].image).x_m.value() += 0.03;
-  EXPECT_THAT(describe_wrong_reference_positions(frames, map, calibration, wrong),
+  EXPECT_THAT(explain_wrong_positions(frames, map, calibration, wrong),
               testing::Eq("captures " + frames[0].image + " to " + frames[4].image + ", " +
                           frames[9].image +
                           " have errors up to 52.0 mm, the others 0.3 mm: taken at other positions "
@@ -120,12 +119,12 @@ TEST_F(PlaceFault, DescribeWrongReferencePositionsIsEmptyWhenMostAreWrong) {
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (i % 4 != 0) wrong.at(frames[i].image).y_m.value() += 0.02;
   }
-  EXPECT_EQ(describe_wrong_reference_positions(frames, map, calibration, wrong), "");
+  EXPECT_EQ(explain_wrong_positions(frames, map, calibration, wrong), "");
 }
 
 /// The zenith of another camera displaces all fixes by one offset in the frame of the camera.
 TEST_F(PlaceFault, FindCommonPositionOffsetDistinguishesCameraFromRoomFrame) {
-  EXPECT_FALSE(find_common_position_offset(frames, map, calibration, places));
+  EXPECT_FALSE(find_common_offset(frames, map, calibration, places));
   const Positioner positioner(map, calibration);
   CapturesTable rotating = places, constant = places, scattered = places;
   for (std::size_t i = 0; i < frames.size(); ++i) {
@@ -137,27 +136,27 @@ TEST_F(PlaceFault, FindCommonPositionOffsetDistinguishesCameraFromRoomFrame) {
     constant.at(frames[i].image).x_m.value() += 0.03;
     scattered.at(frames[i].image).x_m.value() += i % 2 == 0 ? 0.03 : -0.03;
   }
-  const auto camera_offset = find_common_position_offset(frames, map, calibration, rotating);
+  const auto camera_offset = find_common_offset(frames, map, calibration, rotating);
   ASSERT_TRUE(camera_offset);
   EXPECT_TRUE(camera_offset->in_camera);
-  EXPECT_THAT(describe_common_position_offset(*camera_offset),
+  EXPECT_THAT(describe_common_offset(*camera_offset),
               HasSubstr("are off by 30.0 mm in one direction of the camera (x -30.0 mm, y "));
-  const auto world_offset = find_common_position_offset(frames, map, calibration, constant);
+  const auto world_offset = find_common_offset(frames, map, calibration, constant);
   ASSERT_TRUE(world_offset);
   EXPECT_FALSE(world_offset->in_camera);
-  EXPECT_THAT(describe_common_position_offset(*world_offset),
+  EXPECT_THAT(describe_common_offset(*world_offset),
               HasSubstr("in one direction of the room (x -30.3 mm, y +0.0 mm): the known points"));
-  EXPECT_FALSE(find_common_position_offset(frames, map, calibration, scattered));
+  EXPECT_FALSE(find_common_offset(frames, map, calibration, scattered));
 }
 
 struct LensFault : ExampleRig {};
 
 TEST_F(LensFault, DescribeContradictionToCalibratedLensIsEmptyForCorrectLens) {
-  EXPECT_EQ(describe_contradiction_to_calibrated_lens(frames, map, calibration), "");
+  EXPECT_EQ(explain_lens_contradiction(frames, map, calibration), "");
   // A slightly different lens is not another lens.
   calibration.camera.intrinsics[0] *= 1.0005;
   calibration.camera.intrinsics[2] += 0.3;
-  EXPECT_EQ(describe_contradiction_to_calibrated_lens(frames, map, calibration), "");
+  EXPECT_EQ(explain_lens_contradiction(frames, map, calibration), "");
 }
 
 /// As if the boards were of another unit.
@@ -171,7 +170,7 @@ TEST_F(LensFault, DescribeContradictionToCalibratedLensStatesFocalLengthsOfLamps
       lens[1] *= focal;
       lens[2] += off_px;
       lens[3] -= off_px;
-      const std::string fault = describe_contradiction_to_calibrated_lens(frames, map, calibration);
+      const std::string fault = explain_lens_contradiction(frames, map, calibration);
       EXPECT_THAT(fault, AllOf(StartsWith("lamps and boards are imaged by different lenses"),
                                HasSubstr(fmt::format("the boards a focal length of {:.1f} px",
                                                      std::sqrt(lens[0] * lens[1])))))
@@ -190,16 +189,15 @@ TEST_F(LensFault, DescribeContradictionToCalibratedLensIsEmptyForDisplacedLamp) 
   for (Lamp& lamp : map.lamps) {
     const Eigen::Vector3d kept_m = lamp.position_m;
     lamp.position_m += Eigen::Vector3d(0.02, -0.01, 0);
-    EXPECT_EQ(describe_contradiction_to_calibrated_lens(frames, map, calibration), "") << lamp.id;
+    EXPECT_EQ(explain_lens_contradiction(frames, map, calibration), "") << lamp.id;
     lamp.position_m = kept_m;
   }
 }
 
 TEST_F(LensFault, DescribeContradictionToCalibratedLensIsEmptyForTooFewCaptures) {
   calibration.camera.intrinsics[0] *= 1.02;
-  EXPECT_EQ(describe_contradiction_to_calibrated_lens({}, map, calibration), "");
-  EXPECT_EQ(describe_contradiction_to_calibrated_lens(std::span(frames).first(1), map, calibration),
-            "");
+  EXPECT_EQ(explain_lens_contradiction({}, map, calibration), "");
+  EXPECT_EQ(explain_lens_contradiction(std::span(frames).first(1), map, calibration), "");
 }
 
 /// Captures at known heights, equal to the fixes of the true camera.
@@ -234,10 +232,8 @@ TEST_F(OtherCamera, DescribeDifferencesReturnEmptyTextForTiltedUnit) {
   ASSERT_GT(check.frames.size(), 10U);
   set_camera(Lens(calibration.camera.lens_model, calibration.camera.intrinsics),
              Eigen::AngleAxisd(0.005, Eigen::Vector3d(1, 2, 0).normalized()).toRotationMatrix());
-  EXPECT_EQ(describe_focal_length_difference(check, reference, map, calibration), "");
-  EXPECT_EQ(
-      describe_residual_increase_by_other_lens(check.frames, reference.frames, map, calibration),
-      "");
+  EXPECT_EQ(explain_focal_difference(check, reference, map, calibration), "");
+  EXPECT_EQ(explain_other_lens(check.frames, reference.frames, map, calibration), "");
 }
 
 TEST_F(OtherCamera, DescribeFocalLengthDifferenceReportsOnePercentShorterFocalLength) {
@@ -245,10 +241,10 @@ TEST_F(OtherCamera, DescribeFocalLengthDifferenceReportsOnePercentShorterFocalLe
   intrinsics[0] *= 0.99;
   intrinsics[1] *= 0.99;
   set_camera(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
-  EXPECT_THAT(describe_focal_length_difference(check, reference, map, calibration),
+  EXPECT_THAT(explain_focal_difference(check, reference, map, calibration),
               HasSubstr("its focal length differs: the heights have an error of "));
   reference.positions.clear();
-  EXPECT_EQ(describe_focal_length_difference(check, reference, map, calibration), "")
+  EXPECT_EQ(explain_focal_difference(check, reference, map, calibration), "")
       << "no heights to compare";
 }
 
@@ -257,11 +253,9 @@ TEST_F(OtherCamera, DescribeLensDifferenceReportsDisplacedPrincipalPoint) {
   intrinsics[2] += 12;
   intrinsics[3] -= 8;
   set_camera(Lens(calibration.camera.lens_model, intrinsics), Eigen::Matrix3d::Identity());
-  EXPECT_THAT(
-      describe_residual_increase_by_other_lens(check.frames, reference.frames, map, calibration),
-      HasSubstr("its lens differs, by residuals of the lamps of "));
-  EXPECT_EQ(describe_residual_increase_by_other_lens(check.frames, {}, map, calibration), "")
-      << "nothing to compare";
+  EXPECT_THAT(explain_other_lens(check.frames, reference.frames, map, calibration),
+              HasSubstr("its lens differs, by residuals of the lamps of "));
+  EXPECT_EQ(explain_other_lens(check.frames, {}, map, calibration), "") << "nothing to compare";
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ struct StationSteps : testing::Test {
 };
 
 TEST_F(StationSteps, CheckPositionAccuracyOnStationReturnsFixFractionOneForExactCaptures) {
-  const StepResult result = check_position_accuracy_on_station(config, calibration, frames, places);
+  const StepResult result = run_station_check(config, calibration, frames, places);
   EXPECT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_EQ(result.metrics[0].name, "check_fix_fraction");
   EXPECT_EQ(result.metrics[0].value, 1);
@@ -32,22 +32,20 @@ TEST_F(StationSteps, CheckPositionAccuracyOnStationReturnsFixFractionOneForExact
 
 TEST_F(StationSteps, CheckAndDispersionStepsFailForTooFewKnownPositions) {
   places.erase(places.begin());
-  EXPECT_THAT(check_position_accuracy_on_station(config, calibration, frames, places).message,
+  EXPECT_THAT(run_station_check(config, calibration, frames, places).message,
               HasSubstr("1 of the 36 captures"));
-  EXPECT_THAT(calibrate_dispersion_on_station(config, calibration, frames, places).message,
+  EXPECT_THAT(run_station_dispersion(config, calibration, frames, places).message,
               HasSubstr("1 of the 36 captures"));
   config.completion.check_captures = 35;
-  EXPECT_TRUE(
-      check_position_accuracy_on_station(config, calibration, frames, places).has_succeeded());
-  EXPECT_THAT(check_position_accuracy_on_station(config, calibration, {}, places).message,
+  EXPECT_TRUE(run_station_check(config, calibration, frames, places).has_succeeded());
+  EXPECT_THAT(run_station_check(config, calibration, {}, places).message,
               HasSubstr("have no position"));
 }
 
 /// Lamps below their heights in the map: horizontal positions are right, heights are wrong.
 TEST_F(StationSteps, CheckPositionAccuracyOnStationReturnsHeightErrorOfDisplacedLamps) {
   const auto height_mm = [&] {
-    const StepResult result =
-        check_position_accuracy_on_station(config, calibration, frames, places);
+    const StepResult result = run_station_check(config, calibration, frames, places);
     for (const auto& [name, value] : result.metrics) {
       if (name == "check_height_mm") return value;
     }

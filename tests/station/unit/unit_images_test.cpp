@@ -47,7 +47,7 @@ TEST_F(UnitImages, UsesDuplicateImageWhenFirstIsRemoved) {
   add_image("b.png", true);
   EXPECT_EQ(refusal("a.png"), "");
   EXPECT_EQ(refusal("b.png"), "is the same image as a.png");
-  unit.remove_deleted_image(StationStep::boards, "a.png");
+  unit.remove_deleted(StationStep::boards, "a.png");
   EXPECT_EQ(refusal("b.png"), "");
   add_image("a.png", true);
   EXPECT_EQ(refusal("a.png"), "is the same image as b.png");
@@ -55,7 +55,7 @@ TEST_F(UnitImages, UsesDuplicateImageWhenFirstIsRemoved) {
 
 TEST_F(UnitImages, OverwrittenImageReplacesOldImageAndDiscardsStepResult) {
   add_image("a.png", true);
-  unit.solve_completed_station_steps(false);
+  unit.solve_completed(false);
   ASSERT_TRUE(boards().result);  // a problem: one view makes no lens
   add_image("b.png", true);
   EXPECT_TRUE(boards().result) << "an image that is not used changes nothing";
@@ -76,9 +76,9 @@ TEST_F(UnitImages, DiscardedUnreadableImagesStillCountAsRefused) {
   add_image("d.png", true);
   unit.mark_image_discarded(StationStep::boards, "d.png");  // same pose: no fault
   EXPECT_FALSE(boards().images.contains("d.png"));
-  unit.remove_deleted_image(StationStep::boards, "a.png");
-  unit.solve_completed_station_steps(true);
-  EXPECT_THAT(find_causes_of_failure(unit),
+  unit.remove_deleted(StationStep::boards, "a.png");
+  unit.solve_completed(true);
+  EXPECT_THAT(list_failure_causes(unit),
               ElementsAre(testing::Field(&Cause::text, AllOf(HasSubstr("boards (0/1)"),
                                                              HasSubstr("2 of 2 images refused")))));
 }

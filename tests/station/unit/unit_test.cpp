@@ -34,11 +34,11 @@ struct UnitTest : testing::Test {
 };
 
 TEST_F(UnitTest, StartsWithBoardsStepAndInvalidVerdict) {
-  EXPECT_EQ(unit.first_incomplete_step(), StationStep::boards);
+  EXPECT_EQ(unit.first_incomplete(), StationStep::boards);
   EXPECT_FALSE(unit.latest_calibration());
-  EXPECT_THAT(find_causes_of_failure(unit),
+  EXPECT_THAT(list_failure_causes(unit),
               ElementsAre(Field(&Cause::text, HasSubstr("boards: too few images"))));
-  EXPECT_EQ(decide_verdict_from_causes(find_causes_of_failure(unit)), Verdict::invalid);
+  EXPECT_EQ(decide_verdict(list_failure_causes(unit)), Verdict::invalid);
 }
 
 TEST_F(UnitTest, CanNoLongerPassAfterMaxConsecutiveRejections) {
@@ -48,13 +48,13 @@ TEST_F(UnitTest, CanNoLongerPassAfterMaxConsecutiveRejections) {
   }
   EXPECT_TRUE(unit.can_no_longer_pass());
   EXPECT_EQ(unit.step_state(StationStep::boards).count_used_images(), 0);
-  unit.solve_completed_station_steps(true);
+  unit.solve_completed(true);
   EXPECT_THAT(
-      find_causes_of_failure(unit),
+      list_failure_causes(unit),
       ElementsAre(Field(&Cause::text, HasSubstr("12 of 12 images refused: 12 cannot be read"))));
-  EXPECT_EQ(decide_verdict_from_causes(find_causes_of_failure(unit)), Verdict::invalid)
+  EXPECT_EQ(decide_verdict(list_failure_causes(unit)), Verdict::invalid)
       << "images that cannot be read are no fault";
-  unit.remove_deleted_image(StationStep::boards, "100.png");
+  unit.remove_deleted(StationStep::boards, "100.png");
   EXPECT_FALSE(unit.can_no_longer_pass());
 }
 
@@ -79,12 +79,12 @@ TEST_F(UnitTest, CanStillPassWhenOneImageOfBatchIsUsed) {
 }
 
 TEST_F(UnitTest, VerdictIsInvalidWhenUnitIsEndedEarly) {
-  unit.end_unit_before_completion("the operator ended the run");
+  unit.end_early("the operator ended the run");
   EXPECT_THAT(
-      find_causes_of_failure(unit),
+      list_failure_causes(unit),
       ElementsAre(Field(&Cause::text,
                         "boards: the operator ended the run before there was enough (0/36)")));
-  const RunRecord record = make_unit_run_record(unit, make_run_id(), {"test", "0"});
+  const RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
   EXPECT_EQ(record.verdict, "INVALID");
   EXPECT_TRUE(record.is_verdict_invalid());
   std::string screen;
@@ -113,19 +113,19 @@ TEST(MakeVerdictScreen, NamesUnfinishedStepOrUnmeasuredGates) {
   const auto measure = [&](const std::vector<Metric>& metrics) {
     record.metrics = check_gates(gates, metrics);
   };
-  record.set_verdict_from_causes({{"boards: no image can be used"}});
+  record.set_causes({{"boards: no image can be used"}});
   measure({{"blur_px", 0.5}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 4 gates, because boards did not finish");
   // A metric of a failed step, and one available before a step is solved.
-  record.set_verdict_from_causes({{"boards (36/36): two halves"}});
+  record.set_causes({{"boards (36/36): two halves"}});
   measure({{"blur_px", 0.5}, {"rms_px", 0.1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because boards did not finish");
-  record.set_verdict_from_causes({{"the golden unit failed"}, {"rotation: no image can be used"}});
+  record.set_causes({{"the golden unit failed"}, {"rotation: no image can be used"}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 3 gates, because rotation did not finish");
-  record.set_verdict_from_causes({{"check: no image can be used"}});
+  record.set_causes({{"check: no image can be used"}});
   measure({{"blur_px", 0.5}, {"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: 1 gate, because check did not finish");
-  record.set_verdict_from_causes({{"the station has moved"}});
+  record.set_causes({{"the station has moved"}});
   measure({{"rms_px", 0.1}, {"rotation_px", 0.1}, {"dispersion_mm", 0.1}, {"check_mean_mm", 1}});
   EXPECT_EQ(gates_line(record), "Gates    not measured: blur_px");
   measure({{"blur_px", 0.5},
@@ -142,47 +142,45 @@ TEST(MakeVerdictScreen, NamesUnfinishedStepOrUnmeasuredGates) {
 }
 
 TEST_F(UnitTest, RejectsImageUsedByAnotherCamera) {
-  unit.set_lookup_of_run_using_image([](const std::string&) { return ImageUser{"0001", "R"}; });
+  unit.set_image_lookup([](const std::string&) { return ImageUser{"0001", "R"}; });
   fs::copy_file(kView, folder / "0.png");
   unit.add_step_images(StationStep::boards, {folder / "0.png"});
   EXPECT_EQ(
       unit.step_state(StationStep::boards).images.at("0.png").rejection_message(),
       "already of camera 0001, run R: if its serial was wrong, 'vlp-station void R --station " +
           config.file.string() + " --operator NAME --reason WHY' frees its images");
-  unit.solve_completed_station_steps(true);
-  EXPECT_THAT(find_causes_of_failure(unit),
+  unit.solve_completed(true);
+  EXPECT_THAT(list_failure_causes(unit),
               ElementsAre(Field(&Cause::text,
                                 HasSubstr("1 already of camera 0001, run R: if its serial was "
                                           "wrong, 'vlp-station void R --station "))));
-  EXPECT_EQ(decide_verdict_from_causes(find_causes_of_failure(unit)), Verdict::invalid);
+  EXPECT_EQ(decide_verdict(list_failure_causes(unit)), Verdict::invalid);
 }
 
-TEST(InvalidateRunForReusedImages, MakesRecordInvalidAndNamesEarlierRun) {
+TEST(InvalidateReuse, MakesRecordInvalidAndNamesEarlierRun) {
   RunRecord record;
-  record.set_verdict_from_causes({});
+  record.set_causes({});
   ASSERT_TRUE(record.has_run_passed());
-  invalidate_run_for_reused_images(record, "R1", "station.yaml");
+  invalidate_reuse(record, "R1", "station.yaml");
   EXPECT_TRUE(record.is_verdict_invalid());
-  EXPECT_EQ(record.first_verdict_cause(),
+  EXPECT_EQ(record.first_cause(),
             "all images are those of run R1, which is no repetition: take new ones, or "
             "'vlp-station void R1 --station station.yaml --operator NAME --reason WHY' if that run "
             "should not count");
 }
 
-TEST(DecideVerdictFromCauses, ReturnsVerdictOfFirstCause) {
-  EXPECT_EQ(decide_verdict_from_causes({}), Verdict::pass);
-  EXPECT_EQ(decide_verdict_from_causes({{"decentered", true}, {"the operator left"}}),
-            Verdict::fail);
-  EXPECT_EQ(decide_verdict_from_causes({{"lamp 5 is loose"}, {"the fixes are off", true}}),
-            Verdict::invalid);
+TEST(DecideVerdict, ReturnsVerdictOfFirstCause) {
+  EXPECT_EQ(decide_verdict({}), Verdict::pass);
+  EXPECT_EQ(decide_verdict({{"decentered", true}, {"the operator left"}}), Verdict::fail);
+  EXPECT_EQ(decide_verdict({{"lamp 5 is loose"}, {"the fixes are off", true}}), Verdict::invalid);
 }
 
 TEST_F(UnitTest, QueuesImagesOfStepUntilPreviousStepIsComplete) {
   const auto file = folder.file("0.png", "no image");
   unit.add_step_images(StationStep::check, {file});
-  unit.solve_completed_station_steps(false);
+  unit.solve_completed(false);
   EXPECT_EQ(unit.step_state(StationStep::check).pending_images.size(), 1u);
-  unit.remove_deleted_image(StationStep::check, "0.png");
+  unit.remove_deleted(StationStep::check, "0.png");
   EXPECT_TRUE(unit.step_state(StationStep::check).pending_images.empty());
 }
 
@@ -191,7 +189,7 @@ TEST_F(UnitTest, ScreenLinesHaveAtMost80Characters) {
   add_bad(2);
   for (const ScreenLine& line : make_station_screen(unit))
     EXPECT_LE(line.text.size(), 80u) << line.text;
-  const RunRecord record = make_unit_run_record(unit, make_run_id(), {"test", "0"});
+  const RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
   EXPECT_FALSE(record.has_run_passed());
   for (const ScreenLine& line : make_verdict_screen(record)) {
     EXPECT_LE(line.text.size(), 80u) << line.text;
@@ -199,28 +197,28 @@ TEST_F(UnitTest, ScreenLinesHaveAtMost80Characters) {
 }
 
 TEST_F(UnitTest, ReportStatesVerdictOrNoneForEditedRecord) {
-  RunRecord record = make_unit_run_record(unit, make_run_id(), {"test", "0"});
-  EXPECT_THAT(make_run_report_html(record, "", {}),
+  RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
+  EXPECT_THAT(make_run_report(record, "", {}),
               AllOf(HasSubstr("<strong>INVALID</strong><p>boards: too few images"),
                     HasSubstr("not\u00a0reached"), Not(HasSubstr("NOT\u00a0MET"))));
   record.images = {{"boards", "7.png", "", "too dark"}};
-  EXPECT_THAT(make_run_report_html(record, "", {}),
+  EXPECT_THAT(make_run_report(record, "", {}),
               AllOf(HasSubstr("boards/7.png"), HasSubstr("too dark")));
   record.metrics =
       check_gates({{"coverage", 0.7}, {"rms_px", 0.3}}, {{"coverage", 0.75}, {"rms_px", 0.1}});
   record.causes.clear();
   record.verdict = "PASS";
-  EXPECT_THAT(make_run_report_html(record, "", {}),
+  EXPECT_THAT(make_run_report(record, "", {}),
               AllOf(HasSubstr("<strong>PASS"), HasSubstr("at least\u00a00.7"), HasSubstr("0.75"),
                     Not(HasSubstr("is not met")), Not(HasSubstr("confidence interval"))));
   // Once, with its meaning, among the gates.
-  const std::string page = make_run_report_html(record, "", {});
+  const std::string page = make_run_report(record, "", {});
   EXPECT_EQ(page.find("coverage: share"), page.rfind("coverage: share"));
   // Edited in the database.
   record.metrics[1].value = 0.5;
-  EXPECT_THAT(describe_why_verdict_is_void_or_edited(record),
+  EXPECT_THAT(explain_void_verdict(record),
               HasSubstr("rms_px is 0.5 px, at most 0.3 px is required"));
-  EXPECT_THAT(make_run_report_html(record, "", {}),
+  EXPECT_THAT(make_run_report(record, "", {}),
               AllOf(HasSubstr("NO VERDICT</strong><p>the record has PASS, but rms_px"),
                     Not(HasSubstr("<strong>PASS"))));
   for (const ScreenLine& line : make_verdict_screen(record)) {

@@ -14,7 +14,7 @@ namespace {
 
 using testing::SizeIs;
 
-TEST(VerifyStationFromGoldenImages, RecordStartsAtTimeOfRunId) {
+TEST(VerifyFromImages, RecordStartsAtTimeOfRunId) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "check");
   folder.file("check/0000.png", "no image");
@@ -23,8 +23,7 @@ TEST(VerifyStationFromGoldenImages, RecordStartsAtTimeOfRunId) {
                         .calibration = read_calibration(kExample + "calibration.yaml"),
                         .gates = {{"check_fix_fraction", 0.9}}};
   const std::string run = "20200102T030405Z-0123456789abcdef", before = get_current_utc();
-  const RunRecord record =
-      verify_station_from_golden_images(config, folder / "", run, {"test", "0"}, 1).record;
+  const RunRecord record = verify_from_images(config, folder / "", run, {"test", "0"}, 1).record;
   EXPECT_EQ(record.run, run);
   EXPECT_EQ(record.begun_utc, "2020-01-02T03:04:05Z");
   EXPECT_GE(record.ended_utc, before);

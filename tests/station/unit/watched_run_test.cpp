@@ -47,10 +47,10 @@ TEST_F(WatchedRunTest, WritesNoFrameWhenFolderBecameSymbolicLink) {
   if (!write_video(video, {frame, frame})) GTEST_SKIP() << "OpenCV writes no video here";
   StepSources sources({video.string()}, {800, 600});
   WatchedRun run(unit, spool);
-  sources.write_next_frame_of_step(unit, run);
+  sources.write_next_frame(unit, run);
   ASSERT_TRUE(fs::exists(run.run_folder() / "boards/frame-000000.png"));
   replace_by_link("captures/0001/boards");
-  EXPECT_THAT(rejection_message([&] { sources.write_next_frame_of_step(unit, run); }),
+  EXPECT_THAT(rejection_message([&] { sources.write_next_frame(unit, run); }),
               HasSubstr("boards: was moved or replaced while it was in use"));
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
@@ -59,7 +59,7 @@ TEST_F(WatchedRunTest, DeleteRejectedImageFileKeepsFileBehindLaterSymbolicLink) 
   WatchedRun run(unit, spool);
   for (const char* name : {"captures/0001/boards/a.png", "elsewhere/a.png"}) folder.file(name, "a");
   replace_by_link("captures/0001/boards");
-  run.delete_rejected_image_file(StationStep::boards, "a.png");
+  run.delete_rejected(StationStep::boards, "a.png");
   EXPECT_FALSE(fs::exists(folder / "moved/a.png"));
   EXPECT_TRUE(fs::exists(folder / "elsewhere/a.png"));
 }
@@ -68,14 +68,14 @@ TEST_F(WatchedRunTest, RenameFinishedRunFolderThrowsWhenFolderWasReplaced) {
   {
     const WatchedRun run(unit, spool);
     replace_by_link("captures/0001");
-    EXPECT_THAT(rejection_message([&] { run.rename_finished_run_folder(); }),
+    EXPECT_THAT(rejection_message([&] { run.rename_finished(); }),
                 HasSubstr("0001: was moved or replaced while it was in use"));
     EXPECT_TRUE(fs::is_symlink(run.run_folder()));
   }
   fs::remove(folder / "captures/0001");
   fs::rename(folder / "moved", folder / "captures/0001");
   const WatchedRun again(unit, spool);
-  again.rename_finished_run_folder();
+  again.rename_finished();
   EXPECT_TRUE(fs::exists(folder / ("captures/0001." + again.run_id())));
 }
 
@@ -88,13 +88,13 @@ std::vector<std::string> names(const std::vector<std::filesystem::path>& files) 
 TEST(WatchedFolder, ReportsImageOnceItsContentNoLongerChanges) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "");
-  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
+  EXPECT_THAT(watched.poll().added, IsEmpty());
   folder.file("a.png", "half");
-  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
+  EXPECT_THAT(watched.poll().added, IsEmpty());
   folder.file("a.png", "the whole");
-  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
-  EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png"));
-  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
+  EXPECT_THAT(watched.poll().added, IsEmpty());
+  EXPECT_THAT(names(watched.poll().added), ElementsAre("a.png"));
+  EXPECT_THAT(watched.poll().added, IsEmpty());
 }
 
 TEST(WatchedFolder, ReportsOverwrittenAndRemovedImages) {
@@ -102,12 +102,12 @@ TEST(WatchedFolder, ReportsOverwrittenAndRemovedImages) {
   WatchedFolder watched(folder / "");
   folder.file("a.png", "one");
   folder.file("b.png", "two");
-  watched.poll_folder_changes();
-  EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png", "b.png"));
+  watched.poll();
+  EXPECT_THAT(names(watched.poll().added), ElementsAre("a.png", "b.png"));
   folder.file("a.png", "another");
   std::filesystem::remove(folder / "b.png");
-  EXPECT_THAT(watched.poll_folder_changes().removed, ElementsAre("b.png"));
-  EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png"));
+  EXPECT_THAT(watched.poll().removed, ElementsAre("b.png"));
+  EXPECT_THAT(names(watched.poll().added), ElementsAre("a.png"));
 }
 
 TEST(WatchedFolder, IgnoresHiddenEmptyAndNonImageFilesAndFolders) {
@@ -117,18 +117,18 @@ TEST(WatchedFolder, IgnoresHiddenEmptyAndNonImageFilesAndFolders) {
   folder.file("empty.png", "");
   std::filesystem::create_directory(folder / "folder.png");
   WatchedFolder watched(folder / "");
-  watched.poll_folder_changes();
-  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
+  watched.poll();
+  EXPECT_THAT(watched.poll().added, IsEmpty());
 }
 
 TEST(WatchedFolder, ReportsImagesOfFolderCreatedLater) {
   const TemporaryFolder folder;
   WatchedFolder watched(folder / "later");
-  EXPECT_THAT(watched.poll_folder_changes().added, IsEmpty());
+  EXPECT_THAT(watched.poll().added, IsEmpty());
   std::filesystem::create_directory(folder / "later");
   folder.file("later/a.png", "image");
-  watched.poll_folder_changes();
-  EXPECT_THAT(names(watched.poll_folder_changes().added), ElementsAre("a.png"));
+  watched.poll();
+  EXPECT_THAT(names(watched.poll().added), ElementsAre("a.png"));
 }
 
 }  // namespace
