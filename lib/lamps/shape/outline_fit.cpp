@@ -962,6 +962,8 @@ class OutlineFitter {
                      pixel_from_plane * (outline_.plane_point_from_unit(u) - start_center_));
       }
     }
+    if (strip.isEmpty() || !(strip.sizes().maxCoeff() < lines_.width + lines_.height))
+      return std::nullopt;
     const PixelBox box = intersect_boxes(
         {static_cast<int>(strip.min().x()), static_cast<int>(strip.min().y()),
          static_cast<int>(strip.sizes().x()) + 2, static_cast<int>(strip.sizes().y()) + 2},
@@ -991,7 +993,7 @@ class OutlineFitter {
       for (int column = box.x; column < box.end_column(); ++column) {
         const Eigen::Vector2d u = position(column, row);
         const double out_px = (sign * u[axis] - 1) * half_px;
-        if (std::abs(u[1 - axis]) > max_off_middle || std::abs(out_px) > reach_px) continue;
+        if (!(std::abs(u[1 - axis]) < max_off_middle && std::abs(out_px) < reach_px)) continue;
         const double error =
             model_error * bright_level + std::max(halo / 2, slope_sd * bright_level * -out_px);
         const double measured = lines_.gray_level_at_pixel(column, line) - background_.level;
