@@ -17,7 +17,7 @@ another() { [ "$(count "$1")" -gt "$before" ]; }
 for moment in '*/work/*/steps/corners/*.txt' '*/work/*/rotated.yaml' '*/sessions/*/row.json'; do
   before=$(count "$moment")
   start_reprocess "$results" --shard-size 3 --cores 1
-  patiently 60 another "$moment"
+  patiently 180 another "$moment"
   kill -9 -- -$!
   wait $! 2>/dev/null || true
   patiently 5 flock --nonblock "$results/.state/lock" true  # killed processes may end a moment later
@@ -45,7 +45,7 @@ gone() { ! pgrep --session "$run"; }
 for signal in TERM HUP; do
   start_reprocess "$results-signal" --shard-size 3 --cores 1
   run=$!
-  patiently 60 pgrep --session "$run" --full 'shard\.py'
+  patiently 180 pgrep --session "$run" --full 'shard\.py'
   kill -$signal "$run"
   code=0
   wait "$run" || code=$?
@@ -60,7 +60,7 @@ expect_baseline "$results-signal" "${sessions[@]:0:2}"
 start_reprocess "$results-lost" --shard-size 3 --cores 1
 worker() { pgrep --session "$run" --full 'shard\.py'; }
 run=$!
-patiently 60 test -e "$results-lost/sessions/$good/row.json"
+patiently 180 test -e "$results-lost/sessions/$good/row.json"
 kill -9 $(worker)
 wait "$run" || fail "the run ended with its worker: $(cat "$said")"
 expect_baseline "$results-lost" "${sessions[@]:0:2}"
