@@ -939,18 +939,10 @@ class OutlineFitter {
     double mean_px, sd_px;
   };
 
-  /// Estimates the displacement of a side by the likelihood of the pixels near its middle: the
-  /// level inside is that of the scanlines whole periods away. Returns std::nullopt if the side may
-  /// be further away than these.
-  std::optional<SideOffset> estimate_side_offset(int axis, int sign) const {
-    constexpr double max_off_middle = 0.6, spare_px = 4, step_px = 0.2, model_error = 0.03,
-                     slope_sd = 0.02;
-    constexpr double max_square = 60, max_weight_at_end = 0.01;
-    const double half_px = px_per_unit_ / outline_.unit_from_plane.row(axis).norm();
-    const double reach_px = period_lines_ + spare_px;
-    const auto position = [&](int column, const PlanePatch::Row& row) {
-      return outline_.unit_from_plane_point(row.at_column(column).at);
-    };
+  /// Returns the box of the pixels up to a distance from the middle of a side; std::nullopt if they
+  /// are not finite.
+  std::optional<PixelBox> find_box_near_side(int axis, int sign, double half_px, double reach_px,
+                                             double max_off_middle) const {
     const Matrix2 pixel_from_plane = d_plane_d_pixel_.inverse();
     Eigen::AlignedBox2d strip;
     for (const double out : {-reach_px, reach_px}) {
@@ -964,10 +956,23 @@ class OutlineFitter {
     }
     if (strip.isEmpty() || !(strip.sizes().maxCoeff() < lines_.width + lines_.height))
       return std::nullopt;
-    const PixelBox box = intersect_boxes(
+    return intersect_boxes(
         {static_cast<int>(strip.min().x()), static_cast<int>(strip.min().y()),
          static_cast<int>(strip.sizes().x()) + 2, static_cast<int>(strip.sizes().y()) + 2},
         box_);
+  }
+
+  /// Estimates the displacement of a side by the likelihood of the pixels near its middle: the
+  /// level inside is that of the scanlines whole periods away. Returns std::nullopt if the side may
+  /// be further away than these.
+  std::optional<SideOffset> estimate_side_offset(int axis, int sign) const {
+    constexpr double max_off_middle = 0.6, spare_px = 4, step_px = 0.2, model_error = 0.03,
+                     slope_sd = 0.02;
+    constexpr double max_square = 60, max_weight_at_end = 0.01;
+    const double half_px = px_per_unit_ / outline_.unit_from_plane.row(axis).norm();
+    const double reach_px = period_lines_ + spare_px;
+    const auto box = find_box_near_side(axis, sign, half_px, reach_px, max_off_middle);
+    if (!box) return std::nullopt;
     const auto num_steps = std::lround(reach_px / step_px);
     const auto make_offsets = [&](Eigen::Index n) {
       return Eigen::ArrayXd::LinSpaced(2 * n + 1, -double(n) * step_px, double(n) * step_px).eval();
@@ -979,7 +984,7 @@ class OutlineFitter {
                              });
     Eigen::ArrayXd squares = Eigen::ArrayXd::Zero(offsets_px.size());
     const double bright_level = bright_level_ - background_.level, halo = compute_halo();
-    for (int line = box.y; line < box.end_row(); ++line) {
+    for (int line = box->y; line < box->end_row(); ++line) {
       const PlanePatch::Row row(patch_, line);
       const auto index = 2 * std::size_t(line - box_.y);
       const auto [left, left_sd] = predict_level_inside(index);
@@ -990,8 +995,8 @@ class OutlineFitter {
       // Sums of residuals without the level's error, and of the coverage.
       Eigen::ArrayXd square_sum = Eigen::ArrayXd::Zero(offsets_px.size()), product = square_sum,
                      coverage_square = square_sum;
-      for (int column = box.x; column < box.end_column(); ++column) {
-        const Eigen::Vector2d u = position(column, row);
+      for (int column = box->x; column < box->end_column(); ++column) {
+        const Eigen::Vector2d u = outline_.unit_from_plane_point(row.at_column(column).at);
         const double out_px = (sign * u[axis] - 1) * half_px;
         if (!(std::abs(u[1 - axis]) < max_off_middle && std::abs(out_px) < reach_px)) continue;
         const double error =
