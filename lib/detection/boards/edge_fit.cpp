@@ -24,8 +24,9 @@ struct EncodedLevel {
     if (gamma == 1) return;
     constexpr double min_light = 1e-3;  // the curve is vertical at 0
     const double clamped_light = std::max(light, min_light);
-    // Faster than std::pow, whose last digits are not needed.
-    level = kWhite * std::exp(std::log(clamped_light / kWhite) / gamma);
+    // Single precision: faster, and far below the rounding of the levels.
+    const auto fraction = static_cast<float>(clamped_light / kWhite);
+    level = kWhite * std::exp(std::log(fraction) / static_cast<float>(gamma));
     slope = level / (gamma * clamped_light);
   }
 
