@@ -50,6 +50,13 @@ Calibration add_adjustment(Calibration calibration, const RotationCenter& rotati
   return calibration;
 }
 
+Calibration extract_geometry(const Calibration& calibration) {
+  Calibration geometry;
+  geometry.camera = calibration.camera;
+  geometry.rotation_center = calibration.rotation_center;
+  return geometry;
+}
+
 Calibration remove_dispersion(Calibration calibration) {
   calibration.dispersion.reset();
   remove_history(calibration, "dispersion");

@@ -34,6 +34,9 @@ Calibration add_adjustment(Calibration calibration, const RotationCenter& rotati
 /// removes the rows of lamps that are correlated with the dispersion only.
 Calibration remove_dispersion(Calibration calibration);
 
+/// Returns camera and rotation center without their covariances.
+Calibration extract_geometry(const Calibration& calibration);
+
 /// Returns the calibration with this dispersion and `entry` in its history.
 /// @param covariance  joint covariance of all steps; std::nullopt if unknown
 Calibration add_dispersion(Calibration calibration, const Dispersion& dispersion,

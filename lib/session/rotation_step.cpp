@@ -28,52 +28,27 @@ std::string_view rotation_method_name(RotationMethod method) {
       ->first;
 }
 
-RotationFit fit_rotation(const RotationCaptures& rotation, const Camera& camera,
-                         RotationMethod method) {
-  const RotationFit axis = fit_rotation_axis(rotation, camera);
-  return method == RotationMethod::axis ? axis : fit_circle_centers(rotation, camera, axis).mean;
-}
-
-/// Returns the zenith point and, if known, the lever arm.
-Eigen::VectorXd make_solution_vector(const RotationCenter& center) {
-  Eigen::VectorXd solved(center.lever_arm_m ? 4 : 2);
-  solved.head<2>() = compute_zenith_point(center);
-  if (center.lever_arm_m) solved.tail<2>() = *center.lever_arm_m;
-  return solved;
-}
-
-/// Returns the joint covariance of lens, zenith and lever arm. `own` is that of zenith and lever
-/// arm with an exact lens; `center_for` estimates the center with another lens; std::nullopt if
-/// that fails.
-std::optional<JointCovariance> compute_joint_covariance(
-    const RotationCenter& center, const std::optional<MatrixX>& own, const LampCaptures& input,
-    const std::function<std::optional<RotationCenter>(const Camera& camera)>& center_for,
-    StepResult& result) {
-  if (!own) return std::nullopt;
-  JointCovariance joint = make_lens_covariance(input.calibration);
-  std::optional<MatrixX> jacobian(MatrixX(own->rows(), 0));
-  if (!joint.parameters.empty()) {
-    const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
-      const auto moved =
-          center_for(add_intrinsics_error(extract_camera(input.calibration), error).camera);
-      if (!moved || moved->lever_arm_m.has_value() != center.lever_arm_m.has_value()) return {};
-      return make_solution_vector(*moved);
-    };
-    jacobian = differentiate_solution(with_error, make_solution_vector(center), joint.matrix);
-  }
-  if (!jacobian) {
-    result.warnings.emplace_back(
-        "the effect of lens errors on the zenith cannot be determined, and sd of fixes will lack "
-        "it; use vlp-adjust");
-    joint = {};
-    jacobian = MatrixX(own->rows(), 0);
-  }
+/// Appends zenith and, if known, lever arm to the covariance of the lens. `own` is their covariance
+/// with an exact lens, and `jacobian_wrt_lens` their derivative with respect to it.
+JointCovariance append_center(JointCovariance lens, const MatrixX& jacobian_wrt_lens,
+                              const MatrixX& own) {
   std::vector<std::string> names;
   for (const std::string_view first : {kZenithParameter, kLeverArmParameter})
     std::ranges::copy(list_pair_names(first), std::back_inserter(names));
-  names.resize(static_cast<std::size_t>(own->rows()));
-  append_parameters(joint, names, *jacobian, *own);
-  return joint;
+  names.resize(static_cast<std::size_t>(own.rows()));
+  append_parameters(lens, names, jacobian_wrt_lens, own);
+  return lens;
+}
+
+/// Returns the joint covariance of lens, zenith and lever arm. `own` is that of zenith and lever
+/// arm with an exact lens, and `joint` that of all, if the covariance of the lens is known.
+JointCovariance make_joint_covariance(const Calibration& calibration, const MatrixX& own,
+                                      const std::optional<MatrixX>& joint) {
+  JointCovariance lens = make_lens_covariance(calibration);
+  const MatrixX independent = MatrixX::Zero(own.rows(), lens.matrix.cols());
+  JointCovariance result = append_center(std::move(lens), independent, own);
+  if (joint) result.matrix = *joint;
+  return result;
 }
 
 /// Returns true if two sets of captures have the same observations in the same order.
@@ -87,21 +62,36 @@ bool has_same_observations(const RotationCaptures& a, const RotationCaptures& b)
                     });
 }
 
-/// Computes the joint covariance from fits of the same observations. A fit that rejects other
-/// observations changes by more than the lens causes.
-std::optional<JointCovariance> compute_joint_covariance(RotationResult& result,
-                                                        const LampCaptures& input,
-                                                        RotationMethod method) {
-  const auto center_for = [&](const Camera& camera) -> std::optional<RotationCenter> {
-    const RotationCaptures rotation = detect_pivots(input.frames, input.lamps, camera);
-    if (rotation.status != RotationStatus::ok || !has_same_observations(rotation, result.rotation))
-      return {};
-    const RotationFit fit = fit_rotation(rotation, camera, method);
-    if (!fit.converged || fit.used_observations != result.fit.used_observations) return {};
-    return fit.center;
-  };
-  return compute_joint_covariance(result.fit.center, result.fit.covariance, input, center_for,
-                                  result);
+/// Differentiates the mean of the circle centers by fits of the same observations with other
+/// lenses. A fit that rejects other observations changes by more than the lens causes.
+std::optional<JointCovariance> compute_circle_covariance(RotationResult& result,
+                                                         const LampCaptures& input) {
+  const RotationFit& fit = result.fit;
+  if (!fit.covariance) return std::nullopt;
+  JointCovariance lens = make_lens_covariance(input.calibration);
+  std::optional<MatrixX> jacobian(MatrixX(fit.covariance->rows(), 0));
+  if (!lens.parameters.empty()) {
+    const auto with_error = [&](const Eigen::VectorXd& error) -> std::optional<Eigen::VectorXd> {
+      const Camera camera = add_intrinsics_error(extract_camera(input.calibration), error).camera;
+      const RotationCaptures rotation = detect_pivots(input.frames, input.lamps, camera);
+      if (rotation.status != RotationStatus::ok ||
+          !has_same_observations(rotation, result.rotation))
+        return {};
+      const RotationFit other =
+          fit_circle_centers(rotation, camera, fit_rotation_axis(rotation, camera)).mean;
+      if (!other.converged || other.used_observations != fit.used_observations) return {};
+      return Eigen::VectorXd(compute_zenith_point(other.center));
+    };
+    jacobian = differentiate_solution(with_error, compute_zenith_point(fit.center), lens.matrix);
+  }
+  if (!jacobian) {
+    result.warnings.emplace_back(
+        "the effect of lens errors on the zenith cannot be determined, and sd of fixes will lack "
+        "it; use vlp-adjust");
+    lens = {};
+    jacobian = MatrixX(fit.covariance->rows(), 0);
+  }
+  return append_center(std::move(lens), *jacobian, *fit.covariance);
 }
 
 void add_warnings(RotationResult& result) {
@@ -234,7 +224,9 @@ RotationResult run_rotation_step(const LampCaptures& input, RotationMethod metho
     }
     return result;
   }
-  const RotationFit axis = fit_rotation_axis(result.rotation, camera);
+  const auto& report = input.calibration.intrinsics_report;
+  const RotationFit axis =
+      fit_rotation_axis(result.rotation, camera, report ? report->covariance : std::nullopt);
   result.circles = fit_circle_centers(result.rotation, camera, axis);
   result.fit = method == RotationMethod::axis ? axis : result.circles.mean;
   if (!result.fit.converged) {
@@ -248,7 +240,10 @@ RotationResult run_rotation_step(const LampCaptures& input, RotationMethod metho
     explain_by_map_errors(input, extract_camera(input.calibration), result);
     return result;
   }
-  auto covariance = compute_joint_covariance(result, input, method);
+  auto covariance = method == RotationMethod::circle
+                        ? compute_circle_covariance(result, input)
+                        : make_joint_covariance(input.calibration, *result.fit.covariance,
+                                                result.fit.joint_covariance);
   add_metrics(result, camera.focal_px());
   add_warnings(result);
   result.calibration = add_rotation_center(input.calibration, result.fit.center,
@@ -272,11 +267,10 @@ TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntr
   if (std::any_of(input.motions.begin(), input.motions.end(), may_move)) {
     check_timing_known(input.calibration.camera);
   }
-  const auto leveled = [&](const Camera& camera) {
-    return estimate_tilt_from_lamps(input.frames, input.lamps, camera, options);
-  };
+  if (const auto& report = input.calibration.intrinsics_report)
+    options.lens_covariance = report->covariance;
   TiltCalibration& leveling = result.tilt;
-  leveling = leveled(input.calibration.camera);
+  leveling = estimate_tilt_from_lamps(input.frames, input.lamps, input.calibration.camera, options);
   if (!leveling.undetermined.empty()) {
     result.set_step_failure(StepFailure::undetermined, leveling.undetermined);
     explain_by_map_errors(input, alone, result);
@@ -288,12 +282,8 @@ TiltResult run_tilt_step(const LampCaptures& input, bool refine_map, HistoryEntr
                             input.lamps_file);
     return result;
   }
-  const auto center_for = [&](const Camera& camera) {
-    const TiltCalibration other = leveled(camera);
-    return other.undetermined.empty() ? std::optional(other.center) : std::nullopt;
-  };
   auto covariance =
-      compute_joint_covariance(leveling.center, leveling.covariance, input, center_for, result);
+      make_joint_covariance(input.calibration, leveling.covariance, leveling.joint_covariance);
   result.metrics = {{"tilt_deg", deg_from_rad(compute_tilt(leveling.center).angle_rad)}};
   constexpr double max_noise_scale = 3;
   if (leveling.noise_scale > max_noise_scale) {

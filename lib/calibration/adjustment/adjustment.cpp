@@ -150,6 +150,7 @@ class ProblemAssembler {
         sums_m_(pivots_.size(), Eigen::Vector3d::Zero()),
         num_captures_(pivots_.size(), 0) {
     problem_.is_zenith_exact = input.zenith_is_exact;
+    problem_.is_lens_held = input.lens_is_held;
     set_lamps();
     set_tilt_and_arm();
   }
@@ -666,8 +667,9 @@ void set_rotation_center(const AdjustmentProblem& problem, bool has_lever_arm,
 
 /// Sets the joint covariance of intrinsics (from the directions of the lens), zenith, lever arm and
 /// lamps, without the pivots. The one for the surveyed map excludes the lamps.
-void set_joint_covariance(const AdjustmentProblem& problem, const Eigen::MatrixXd& covariance,
-                          bool has_lever_arm, AdjustmentResult& result) {
+void set_joint_covariance(const AdjustmentProblem& problem,
+                          const AdjustmentProblem::GlobalCovariance& found, bool has_lever_arm,
+                          AdjustmentResult& result) {
   const UnknownIndices& at = problem.layout();
   const Eigen::Index intrinsics = count_intrinsics(result.camera);
   const Eigen::Index rows = intrinsics + at.pivots - at.zenith;
@@ -677,7 +679,11 @@ void set_joint_covariance(const AdjustmentProblem& problem, const Eigen::MatrixX
   from_state.block(intrinsics, at.zenith, at.pivots - at.zenith, at.pivots - at.zenith)
       .setIdentity();
   if (!has_lever_arm) from_state.middleRows<2>(intrinsics + 2).setZero();
-  result.refined_covariance = from_state * covariance * from_state.transpose();
+  const Eigen::Index center_size = has_lever_arm ? 4 : 2;
+  result.center_covariance = found.matrix.block(at.zenith, at.zenith, center_size, center_size);
+  result.refined_covariance =
+      from_state * (found.matrix + found.jacobian_wrt_lens * found.jacobian_wrt_lens.transpose()) *
+      from_state.transpose();
   result.refined_covariance =
       0.5 * (result.refined_covariance + result.refined_covariance.transpose()).eval();
   result.surveyed_covariance = result.refined_covariance;
@@ -780,7 +786,7 @@ void set_adjusted_lens(const AdjustmentProblem& problem, const Eigen::MatrixXd& 
   const UnknownIndices& at = problem.layout();
   const Eigen::VectorXd& state = problem.state_vector();
   const Eigen::VectorXd u = state.segment(at.lens, at.lens_size);
-  if (at.lens_size > 0) {
+  if (at.lens_size > 0 && !problem.is_lens_held) {
     const auto determined = eigendecompose(
         Eigen::MatrixXd(Eigen::MatrixXd::Identity(at.lens_size, at.lens_size) -
                         covariance.block(at.lens, at.lens, at.lens_size, at.lens_size)));
@@ -855,7 +861,7 @@ AdjustmentResult adjust_bundle(const AdjustmentInput& all_lamps, const Adjustmen
   result.undetermined =
       explain_undetermined(problem, covariance, result.lamp_height_m, limits, has_lever_arm);
   set_rotation_center(problem, has_lever_arm, result);
-  set_joint_covariance(problem, covariance, has_lever_arm, result);
+  set_joint_covariance(problem, *adjusted, has_lever_arm, result);
   set_adjusted_map(all, input.lamps, contradictions, result);
   set_position_residuals(all, result);
   set_adjusted_lens(problem, covariance, result);

@@ -95,6 +95,8 @@ struct AdjustmentInput {
   bool estimates_lever_arm = true;
   /// Keeps the zenith of the calibration.
   bool zenith_is_exact = false;
+  /// Keeps the lens of the calibration. Its errors are propagated to the result.
+  bool lens_is_held = false;
   /// Set if the captures were checked separately and contain no gross outliers. Skips the robust
   /// start, which rejects all detections of a lamp whose exact position in the map is wrong.
   bool captures_are_checked = false;
@@ -144,12 +146,14 @@ struct AdjustmentResult {
   /// units of JointCovariance, and of the surveyed map. The latter has the same estimates with the
   /// errors of the survey in the positions of the lamps. Zero for quantities taken as exact.
   Eigen::MatrixXd refined_covariance, surveyed_covariance;
-  /// Returns the covariance of the zenith's normalized point and, if there is one, the lever arm.
-  MatrixX center_covariance() const {
-    const Eigen::Index lamp_rows = 3 * std::ssize(covariance_lamp_ids),
-                       first = refined_covariance.rows() - lamp_rows - 4,
-                       size = center.lever_arm_m ? 4 : 2;
-    return refined_covariance.block(first, first, size, size);
+  /// Covariance of the zenith's normalized point and, if there is one, the lever arm, with an exact
+  /// lens if it is held.
+  MatrixX center_covariance;
+  /// Returns the joint covariance of intrinsics, zenith and, if there is one, the lever arm.
+  MatrixX lens_and_center_covariance() const {
+    const Eigen::Index size = refined_covariance.rows() - 3 * std::ssize(covariance_lamp_ids) -
+                              (center.lever_arm_m ? 0 : 2);
+    return refined_covariance.topLeftCorner(size, size);
   }
 
   /// Known position of the camera or of the axis, with its residual after the adjustment.

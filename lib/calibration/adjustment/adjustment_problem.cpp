@@ -369,7 +369,9 @@ bool AdjustmentProblem::solve_adjustment(bool robust) {
       double* const block = blocks.emplace_back(state_.data() + first);
       ceres.AddParameterBlock(block, static_cast<int>(jacobian.cols()));
       order->AddElementToGroup(block, first < layout_.global ? 1 : 0);
-      if (is_block_exact(first)) ceres.SetParameterBlockConstant(block);
+      const bool is_lens = first < layout_.lens + layout_.lens_size;
+      if (is_block_exact(first) || (is_lens && is_lens_held))
+        ceres.SetParameterBlockConstant(block);
     }
     ceres::LossFunction* const loss =
         robust && term.has_loss ? new ceres::CauchyLoss(width) : nullptr;
@@ -489,11 +491,17 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_covariance() cons
   }
   for (std::size_t k = 0; k < captures.size(); ++k) rows[k].marginalize(captures[k], information);
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  Eigen::MatrixXd covariance =
-      solve_symmetric(scale.asDiagonal() * information * scale.asDiagonal(),
-                      Eigen::MatrixXd::Identity(layout_.global, layout_.global));
-  covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
-  covariance = 0.5 * (covariance + covariance.transpose()).eval();
+  const Eigen::Index held = is_lens_held ? layout_.lens_size : 0, free = layout_.global - held;
+  const Eigen::VectorXd free_scale = scale.tail(free);
+  Eigen::MatrixXd free_covariance = solve_symmetric(
+      free_scale.asDiagonal() * information.bottomRightCorner(free, free) * free_scale.asDiagonal(),
+      Eigen::MatrixXd::Identity(free, free));
+  free_covariance = (free_scale.asDiagonal() * free_covariance * free_scale.asDiagonal()).eval();
+  Eigen::MatrixXd jacobian_wrt_lens = Eigen::MatrixXd::Identity(layout_.global, held);
+  jacobian_wrt_lens.bottomRows(free) = -free_covariance * information.bottomLeftCorner(free, held);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(layout_.global, layout_.global);
+  covariance.bottomRightCorner(free, free) =
+      0.5 * (free_covariance + free_covariance.transpose()).eval();
   if (is_zenith_exact) covariance.diagonal().segment<2>(layout_.zenith).setZero();
   for (std::size_t i = 0; i < lamps.size(); ++i) {
     if (is_block_exact(layout_.lamp_state_index(i)))
@@ -503,7 +511,7 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_covariance() cons
   for (const CaptureRows& capture : rows) {
     freedom += static_cast<double>(capture.detection_rows) - capture.predict_variance(covariance);
   }
-  return {covariance, freedom};
+  return {covariance, jacobian_wrt_lens, freedom};
 }
 
 }  // namespace vlp

@@ -141,6 +141,8 @@ class AdjustmentProblem {
   bool has_lever_arm = false;
   /// True if the zenith keeps its initial value.
   bool is_zenith_exact = false;
+  /// True if the lens keeps its initial value, the errors of which change the other unknowns.
+  bool is_lens_held = false;
   /// Factor by which all sigma_px are multiplied.
   double noise_scale = 1;
 
@@ -163,9 +165,12 @@ class AdjustmentProblem {
 
   /// Result of compute_covariance().
   struct GlobalCovariance {
-    /// Covariance of the global unknowns, zero for exact ones. Unknowns without any residual have
-    /// the standard deviation of a guess: 1 rad, 10 m.
+    /// Covariance of the global unknowns, zero for exact ones and for a lens that is held. Unknowns
+    /// without any residual have the standard deviation of a guess: 1 rad, 10 m.
     Eigen::MatrixXd matrix;
+    /// Derivative of the global unknowns with respect to those of a lens that is held, -N^-1 M with
+    /// the information N of the others and its block M of the lens; otherwise no columns.
+    Eigen::MatrixXd jacobian_wrt_lens;
     /// Degrees of freedom of the detections that are used: the number of their coordinates minus
     /// the trace of their hat matrix.
     double degrees_of_freedom;

@@ -30,9 +30,12 @@ bool determines_lever_arm(const RotationFit& fit, const RotationCaptures& rotati
 }
 
 AdjustmentInput make_adjustment_input(const RotationCaptures& rotation, const Camera& camera,
+                                      const std::optional<MatrixX>& lens_covariance,
                                       bool lever_arm) {
   AdjustmentInput input{{}, {rotation.lamps}, {}};
   input.calibration.camera = camera;
+  input.calibration.intrinsics_report.emplace().covariance = lens_covariance;
+  input.lens_is_held = true;
   RotationCenter& center = input.calibration.rotation_center.emplace();
   center.zenith_in_camera = rotation.zenith_in_camera;
   if (lever_arm) center.lever_arm_m = rotation.lever_arm_m;
@@ -58,15 +61,17 @@ AdjustmentInput make_adjustment_input(const RotationCaptures& rotation, const Ca
 }
 
 /// Fits the axis with an estimated lever arm, or with a lever arm of zero.
-RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera, bool lever_arm) {
+RotationFit fit_axis(const RotationCaptures& rotation, const Camera& camera,
+                     const std::optional<MatrixX>& lens_covariance, bool lever_arm) {
   constexpr double no_limit = std::numeric_limits<double>::infinity();
-  const AdjustmentResult adjusted =
-      adjust_bundle(make_adjustment_input(rotation, camera, lever_arm), {no_limit, no_limit});
+  const AdjustmentResult adjusted = adjust_bundle(
+      make_adjustment_input(rotation, camera, lens_covariance, lever_arm), {no_limit, no_limit});
   RotationFit result;
   result.converged = adjusted.has_succeeded();
   if (!result.converged) return result;
   result.center = adjusted.center;
-  result.covariance = adjusted.center_covariance();
+  result.covariance = adjusted.center_covariance;
+  if (lens_covariance) result.joint_covariance = adjusted.lens_and_center_covariance();
   result.residual_px = adjusted.residual_px;
   for (const AdjustmentResult::DetectionResidual& residual : adjusted.residuals) {
     const auto is_same = [&](const RotationObservation& observation) {
@@ -101,14 +106,16 @@ RotationCenter make_rotation_center(const Eigen::Vector2d& z, RotationModel mode
   return {model, ideal_pixel_from_point(camera, z), z.homogeneous().normalized()};
 }
 
-RotationFit fit_rotation_axis(const RotationCaptures& rotation, const Camera& camera) {
+RotationFit fit_rotation_axis(const RotationCaptures& rotation, const Camera& camera,
+                              const std::optional<MatrixX>& lens_covariance) {
   assert(rotation.status == RotationStatus::ok);
   RotationFit result;
   if (rotation.heights.size() > 1) {
-    result = fit_axis(rotation, camera, true);
+    result = fit_axis(rotation, camera, lens_covariance, true);
   } else {
-    if (has_lamp_heights(rotation)) result = fit_axis(rotation, camera, true);
-    if (!determines_lever_arm(result, rotation)) result = fit_axis(rotation, camera, false);
+    if (has_lamp_heights(rotation)) result = fit_axis(rotation, camera, lens_covariance, true);
+    if (!determines_lever_arm(result, rotation))
+      result = fit_axis(rotation, camera, lens_covariance, false);
   }
   if (!result.converged) return result;
   // The model is exact. Large residuals mean that the captures are no rotation about one axis.

@@ -30,6 +30,9 @@ struct RotationFit {
   /// in m, with an exact lens. It includes the map's sd_m if the method depends on the map.
   /// `circle`: it follows from the residuals; there is none without redundancy.
   std::optional<MatrixX> covariance = {};
+  /// Method `axis`, if the covariance of the lens is known: joint covariance of intrinsics, zenith
+  /// and lever arm.
+  std::optional<MatrixX> joint_covariance = {};
   /// RMS residual of the inliers per image axis, in px: sqrt(sum of squares / (measurements -
   /// unknowns)). It estimates the pixel noise. It is 0 if there are as many measurements as
   /// unknowns.
@@ -65,7 +68,7 @@ inline constexpr double kMaxLeverArmSdFraction = 0.005;
 ///     undistorted image. Not converged if the RMS residual exceeds 0.007 focal lengths and four
 ///     times RotationCaptures::median_sigma_px: the captures are then no rotation about one axis.
 ///
-/// A preset of adjust_bundle() with an exact lens and MapPrior::heights: minimizes the
+/// A preset of adjust_bundle() that holds the lens, with MapPrior::heights: minimizes the
 /// squared distances of the lamps, in the image, from
 ///   project(camera_from_level(zenith) (Rz(-g_k) (p_i - A_h) - e, Z_i - z_h))
 /// over
@@ -85,6 +88,9 @@ inline constexpr double kMaxLeverArmSdFraction = 0.005;
 /// The lever arm is set to zero if there is a single H, or if its standard deviation would exceed
 /// kMaxLeverArmSdFraction. The result is then the image of the ceiling point above the axis. At
 /// this height, a fix that is corrected with it is the position of the axis instead of the camera.
-RotationFit fit_rotation_axis(const RotationCaptures& rotation, const Camera& camera);
+///
+/// @param lens_covariance  IntrinsicsReport::covariance
+RotationFit fit_rotation_axis(const RotationCaptures& rotation, const Camera& camera,
+                              const std::optional<MatrixX>& lens_covariance = {});
 
 }  // namespace vlp

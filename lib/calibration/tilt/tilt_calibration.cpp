@@ -10,6 +10,7 @@
 
 #include "captures/number_text.h"
 #include "geometry/angles.h"
+#include "rig/calibration_builder.h"
 #include "rig/find_lamp.h"
 
 namespace vlp {
@@ -68,7 +69,7 @@ std::vector<AdjustmentCapture> select_captures(std::span<const Frame> frames, co
 Placement locate_separately(const std::vector<AdjustmentCapture>& captures, LampMap map,
                             const Calibration& calibration) {
   for (Lamp& lamp : map.lamps) lamp.sd_m.reset();
-  const Positioner positioner(map, calibration);
+  const Positioner positioner(map, extract_geometry(calibration));
   Placement placement;
   placement.detection_counts.resize(map.lamps.size());
   std::vector<Detection> detections;
@@ -223,6 +224,8 @@ TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const La
   const auto captures = select_captures(frames, map, options.motions, result);
   AdjustmentInput input{{}, map, {}};
   input.calibration.camera = camera;
+  input.calibration.intrinsics_report.emplace().covariance = options.lens_covariance;
+  input.lens_is_held = true;
   if (options.refine_map) input.map_prior = MapPrior::frame;
   input.captures_are_checked = true;
   input.weighs_in_undistorted_image = true;
@@ -234,7 +237,8 @@ TiltCalibration estimate_tilt_from_lamps(std::span<const Frame> frames, const La
   if (!result.undetermined.empty()) return result;
   if (all_have_sigma(frames)) result.noise_scale = found.noise_scale;
   result.center = found.center;
-  result.covariance = found.center_covariance();
+  result.covariance = found.center_covariance;
+  if (options.lens_covariance) result.joint_covariance = found.lens_and_center_covariance();
   result.residual_px = found.residual_px;
   if (options.refine_map) {
     result.corrections = found.lamps;

@@ -26,6 +26,8 @@ struct TiltCalibrationOptions {
   /// are estimated together with the pose of the capture. Requires row time and readout direction
   /// of the camera.
   std::vector<KnownMotion> motions = {};
+  /// IntrinsicsReport::covariance, if known.
+  std::optional<MatrixX> lens_covariance = {};
   /// Largest standard deviation of the zenith per axis. Beyond it, the tilt counts as undetermined.
   double max_sd_rad = 0.02;
   /// Largest standard deviation of the correction of a lamp per axis, with `refine_map`. Beyond it,
@@ -44,6 +46,8 @@ struct TiltCalibration {
   /// Covariance of the zenith's normalized point with an exact lens. It is scaled by the residuals
   /// if they exceed the given noise, and includes the errors of the map by its sd_m.
   MatrixX covariance;
+  /// Joint covariance of intrinsics, zenith and lever arm, if that of the lens is known.
+  std::optional<MatrixX> joint_covariance = {};
   /// Lamp map with the corrections; unchanged without `refine_map`.
   LampMap map;
   /// Corrections of the detected lamps, with `refine_map` only.

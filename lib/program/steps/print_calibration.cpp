@@ -182,7 +182,7 @@ void print_lamp_row(int lamp, const Eigen::Vector3d& correction_m, const Eigen::
 
 void print_adjustment(const AdjustmentResult& found, const Calibration& before, bool lens_stated) {
   const RotationCenter& center = found.center;
-  const MatrixX covariance = found.center_covariance();
+  const MatrixX covariance = found.center_covariance;
   fmt::print("captures    {} used, {} rejected\n", found.captures, found.rejected_captures);
   fmt::print("detections  {} used, {} rejected\n", found.detections, found.rejected_detections);
   const Eigen::Vector3d& up = center.zenith_in_camera;

@@ -69,7 +69,7 @@ TEST_F(RunBundleAdjustmentResult, EstimatesAndCovarianceMatchDenseSolution) {
       }
     }
     EXPECT_EQ(found.refined_covariance, found.refined_covariance.transpose());
-    EXPECT_EQ(found.center_covariance(), (found.refined_covariance.block<4, 4>(12, 12)));
+    EXPECT_EQ(found.center_covariance, (found.refined_covariance.block<4, 4>(12, 12)));
     EXPECT_EQ(found.center.model, RotationModel::tilt);
     EXPECT_NEAR(found.center.zenith_in_camera.norm(), 1, 1e-15);
     EXPECT_NEAR(found.center.center_px.x(), parameters[2] + parameters[0] * parameters[12], 1e-9);
@@ -207,7 +207,7 @@ TEST_F(RunBundleAdjustmentResult, NoiseScaleAndContradictionMatchResidualsForToo
   EXPECT_TRUE(found.noise_is_contradicted);
   EXPECT_NEAR(found.residual_px, 0.005 * expected.noise_scale * expected.residual, 1e-6);
   const Eigen::Matrix4d center_covariance = expected.covariance.block<4, 4>(12, 12);
-  expect_relatively_near(found.center_covariance(), center_covariance, 1e-4);
+  expect_relatively_near(found.center_covariance, center_covariance, 1e-4);
   // Sigmas for which the noise scale is 3 % above and below the limit of the contradiction.
   const double limit = 1 + 3 * std::sqrt(0.5 / expected.degrees_of_freedom);
   for (const double factor : {0.97, 1.03}) {
@@ -281,7 +281,7 @@ TEST_F(RunBundleAdjustmentResult, LimitsOfZenithAndLeverArmApplyToLargestSd) {
   EXPECT_TRUE(adjust_bundle(input, {1, arm_fraction * more}).center.lever_arm_m);
   const AdjustmentResult without_arm = adjust({1, arm_fraction * less});
   EXPECT_FALSE(without_arm.center.lever_arm_m);
-  EXPECT_EQ(without_arm.center_covariance().rows(), 2);
+  EXPECT_EQ(without_arm.center_covariance.rows(), 2);
   Eigen::MatrixXd expected = found.refined_covariance;
   expected.middleRows<2>(14).setZero();
   expected.middleCols<2>(14).setZero();

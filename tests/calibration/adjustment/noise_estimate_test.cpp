@@ -85,7 +85,7 @@ TEST_P(RunBundleAdjustmentNoise, NoiseAndZenithSdMatchTruthForAnyKnownPositions)
     const AdjustmentResult found = adjust_bundle(survey.input);
     ASSERT_TRUE(found.has_succeeded()) << found.undetermined;
     const auto& truth = *survey.truth.calibration.rotation_center;
-    const Matrix2 covariance_px2 = center_covariance_px2(found.center_covariance(), found.camera);
+    const Matrix2 covariance_px2 = center_covariance_px2(found.center_covariance, found.camera);
     variance_px2 += std::pow(found.noise_scale * variant.reported_sigma_px.value_or(1), 2) / runs;
     for (int axis = 0; axis < 2; ++axis) {
       squares += std::pow(found.center.center_px[axis] - truth.center_px[axis], 2) /

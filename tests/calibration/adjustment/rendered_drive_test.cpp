@@ -113,7 +113,7 @@ class RenderedDriveCalibration : public testing::Test {
     const AdjustmentResult found = adjust_bundle(input);
     EXPECT_TRUE(found.has_succeeded() && found.center.lever_arm_m) << found.undetermined;
     if (!found.center.lever_arm_m) return {};
-    const MatrixX covariance = found.center_covariance();
+    const MatrixX covariance = found.center_covariance;
     return {zenith_error(found.center), std::sqrt(covariance.topLeftCorner<2, 2>().trace()),
             (*found.center.lever_arm_m - scene.mount.lever_arm_m).norm(),
             std::sqrt(covariance.bottomRightCorner<2, 2>().trace())};
