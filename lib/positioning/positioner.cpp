@@ -186,7 +186,7 @@ class Positioner::Impl {
         body_from_base_(rotation_about_z(mount_.yaw_in_robot_rad)),
         body_from_camera_(body_from_base_ * base_from_camera_),
         max_residual_fraction_(options.max_residual_fraction),
-        rejects_contradicting_lamps_(options.rejects_contradicting_lamps),
+        checks_residuals_(options.checks_residuals),
         unstated_sigma_px_(options.unstated_sigma_px),
         row_clock_(make_readout_clock(calibration.camera)) {
     for (Lamp& lamp : lamps_) lamp.position_m -= origin_m_;
@@ -228,7 +228,7 @@ class Positioner::Impl {
       return make_fix_without_pose(FixStatus::row_time_unknown, unknown_lamps);
     const BodyProblem problem{mount_.position_in_robot_m, prior};
     BodySolution solution = estimate_robust(frame, problem, max_residual_fraction_);
-    if (solution.status == FixStatus::ok && rejects_contradicting_lamps_)
+    if (solution.status == FixStatus::ok && checks_residuals_)
       reject_contradicting(frame, problem, solution);
     Fix fix = solution.status == FixStatus::ok ? make_consistent_fix(frame, problem, solution.fix)
                                                : make_fix_with_candidates(solution);
@@ -448,7 +448,8 @@ class Positioner::Impl {
                           const BodyFix& solution) const {
     Fix fix = make_fix(frame, problem, solution, BodyCovariance::Zero());
     // Noise that is not stated is no contradiction.
-    const double scale = frame.noise_is_stated ? estimate_contradiction(fix) : 1;
+    const bool may_contradict = checks_residuals_ && frame.noise_is_stated;
+    const double scale = may_contradict ? estimate_contradiction(fix) : 1;
     if (scale > 1) {
       if (const auto covariance = find_wider_covariance(frame, problem, solution)) {
         fix = make_fix(frame, problem, solution, *covariance - solution.covariance);
@@ -563,7 +564,7 @@ class Positioner::Impl {
   /// The base is the camera's level frame.
   Eigen::Matrix3d body_from_base_, body_from_camera_;
   double max_residual_fraction_;
-  bool rejects_contradicting_lamps_;
+  bool checks_residuals_;
   double unstated_sigma_px_;
   /// std::nullopt if the calibration lacks row time or readout direction.
   std::optional<RowClock> row_clock_;

@@ -44,9 +44,10 @@ struct PositionerOptions {
   /// closed forms. Errors of lens, tilt and map affect these weights less than weights in the
   /// distorted image.
   double unstated_sigma_px = 1;
-  /// Rejects lamps that contradict the others by more than noise and common errors explain. Without
-  /// it fixes are smooth functions of calibration and map.
-  bool rejects_contradicting_lamps = true;
+  /// Rejects lamps that contradict the others by more than noise and common errors explain, and
+  /// widens the covariance if the residuals contradict the noise. Without it fixes are smooth
+  /// functions of calibration and map.
+  bool checks_residuals = true;
 };
 
 /// Motion of a robot, or, without a mount, of a camera, while an image is read. Normally

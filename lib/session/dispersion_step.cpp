@@ -49,14 +49,14 @@ Fix locate_capture(const Positioner& positioner, const ReferencePointCapture& ca
 
 /// Returns the captures with places of the camera. Captures without a fix have no yaw and keep
 /// their places.
-std::vector<ReferencePointCapture> move_to_camera(const KnownPositions& places,
+std::vector<ReferencePointCapture> move_to_camera(std::vector<ReferencePointCapture> captures,
+                                                  std::span<const MeasuredPoint> measured_points,
                                                   const LampMap& lamps,
                                                   const Calibration& leveled) {
-  std::vector<ReferencePointCapture> captures = places.captures;
   const Positioner positioner(lamps, leveled);
   const Eigen::Vector2d& arm_m = *leveled.rotation_center->lever_arm_m;
   for (std::size_t i = 0; i < captures.size(); ++i) {
-    if (places.measured_points[i] != MeasuredPoint::axis) continue;
+    if (measured_points[i] != MeasuredPoint::axis) continue;
     const Fix fix = locate_capture(positioner, captures[i]);
     if (!fix.has_succeeded()) continue;
     captures[i].reference_point_m +=
@@ -122,17 +122,13 @@ Calibration add_errors(const JointCovariance& joint, Calibration calibration,
 }
 
 /// Adds the offset to the joint covariance; std::nullopt if its errors are unknown.
-std::optional<JointCovariance> compute_joint_covariance(
-    DispersionResult& result, const CapturesFor& captures_for, const LampCaptures& input,
-    const Calibration& leveled, DispersionMethod method, DispersionCircle circle) {
+std::optional<JointCovariance> compute_joint_covariance(DispersionResult& result,
+                                                        const CapturesFor& captures_for,
+                                                        const LampCaptures& input,
+                                                        const Calibration& leveled) {
   const DispersionFit& fit = result.fit;
   if (!fit.covariance) return leveled.covariance;
-  const auto offset_for = [&](const Calibration& perturbed) -> std::optional<Eigen::VectorXd> {
-    const DispersionFit other =
-        estimate_dispersion(captures_for(perturbed), input.lamps, perturbed, method, circle);
-    if (other.status != DispersionStatus::ok) return {};
-    return Eigen::VectorXd(other.dispersion.offset_px.cwiseQuotient(perturbed.camera.focal_px()));
-  };
+  const Eigen::Vector2d focal_px = leveled.camera.focal_px();
   JointCovariance joint;
   if (leveled.covariance) {
     joint = *leveled.covariance;
@@ -149,13 +145,17 @@ std::optional<JointCovariance> compute_joint_covariance(
         covariance.diagonal().segment<2>(*row).array() += min_step * min_step;
     }
     jacobian_wrt_steps = differentiate_solution(
-        [&](const Eigen::VectorXd& errors) {
-          return offset_for(add_errors(joint, leveled, errors));
+        [&](const Eigen::VectorXd& errors) -> std::optional<Eigen::VectorXd> {
+          const Calibration perturbed = add_errors(joint, leveled, errors);
+          const auto offset =
+              predict_offset(fit, focal_px, captures_for(perturbed), input.lamps, perturbed);
+          if (!offset) return std::nullopt;
+          return Eigen::VectorXd(*offset);
         },
-        fit.dispersion.offset_px.cwiseQuotient(leveled.camera.focal_px()), covariance);
+        fit.dispersion.offset_px.cwiseQuotient(focal_px), covariance);
   }
   if (jacobian_wrt_steps) {
-    return append_offset(std::move(joint), fit, *jacobian_wrt_steps, leveled.camera.focal_px());
+    return append_offset(std::move(joint), fit, *jacobian_wrt_steps, focal_px);
   }
   result.warnings.push_back(fmt::format(
       "the effect of lens and zenith errors on the offset cannot be determined, and the "
@@ -221,11 +221,12 @@ DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPosit
         "vlp-rotation with captures at two heights");
     return result;
   }
+  std::vector<ReferencePointCapture> captures = places.captures;
   const CapturesFor captures_for = [&](const Calibration& calibration) {
-    return of_axis ? move_to_camera(places, input.lamps, calibration) : places.captures;
+    if (!of_axis) return captures;
+    return move_to_camera(captures, places.measured_points, input.lamps, calibration);
   };
-  const std::vector<ReferencePointCapture> captures = captures_for(leveled);
-  result.fit = estimate_dispersion(captures, input.lamps, leveled, method, circle);
+  result.fit = estimate_dispersion(captures_for(leveled), input.lamps, leveled, method, circle);
   const DispersionFit& fit = result.fit;
   if (fit.status != DispersionStatus::ok) {
     set_failure(result, input, leveled);
@@ -234,10 +235,12 @@ DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPosit
   if (!input.calibration.rotation_center) {
     result.warnings.emplace_back("the calibration has no rotation_center: run vlp-rotation first");
   }
+  for (std::size_t i = 0; i < captures.size(); ++i)
+    captures[i].detections = fit.captures[i].detections;
   warn_about_few_captures(result, method);
   if (!of_axis) warn_about_lever_arm(result, places, input.lamps, leveled);
   result.metrics = make_metrics(fit);
-  auto covariance = compute_joint_covariance(result, captures_for, input, leveled, method, circle);
+  auto covariance = compute_joint_covariance(result, captures_for, input, leveled);
   result.calibration =
       add_dispersion(input.calibration, fit.dispersion, std::move(covariance), std::move(entry));
   result.drawing = [fit] {

@@ -32,6 +32,19 @@ void set_before_and_after(DispersionFit& fit, const ReferencePointFixes& referen
   fit.dispersion.captures = static_cast<int>(before_m.size());
 }
 
+/// Sets the derivatives of the offset, the first two rows of `jacobian_wrt_fixes`. Returns the
+/// changes of all its rows for errors of the lamps of one standard deviation.
+MatrixX set_derivatives(DispersionFit& fit, const ReferencePointFixes& reference_fixes,
+                        const Eigen::MatrixXd& jacobian_wrt_fixes) {
+  fit.jacobian_wrt_fixes = jacobian_wrt_fixes.topRows<2>();
+  LampDerivatives& by_lamps = fit.lamp_derivatives;
+  by_lamps = reference_fixes.differentiate_by_lamps(fit.dispersion.offset_px);
+  by_lamps.jacobian_wrt_positions = jacobian_wrt_fixes * by_lamps.jacobian_wrt_positions;
+  MatrixX changes = by_lamps.scale_by_lamp_sds();
+  by_lamps.jacobian_wrt_positions.conservativeResize(2, Eigen::NoChange);
+  return changes;
+}
+
 bool all_have_sigma(std::span<const ReferencePointCapture> captures) {
   return std::all_of(captures.begin(), captures.end(), [](const ReferencePointCapture& capture) {
     return std::all_of(capture.detections.begin(), capture.detections.end(),
@@ -47,7 +60,7 @@ void fit_chen_guan_offset(DispersionFit& fit, const ReferencePointFixes& referen
   if (found.status != DispersionStatus::ok) return;
   fit.dispersion.offset_px = found.offset_px;
   fit.covariance = found.covariance;
-  fit.lamp_derivatives = found.lamp_derivatives;
+  if (found.covariance) set_derivatives(fit, reference_fixes, found.jacobian_wrt_fixes);
   set_before_and_after(fit, reference_fixes, found.used, kind);
 }
 
@@ -77,10 +90,8 @@ void fit_camera_offset(DispersionFit& fit, const ReferencePointFixes& reference_
   Matrix2 covariance = factor * separation->covariance.topLeftCorner<2, 2>();
   covariance(1, 0) = covariance(0, 1);
   fit.covariance = covariance;
-  fit.lamp_derivatives = separation->lamp_derivatives;
-  fit.lamp_derivatives.jacobian_wrt_positions.conservativeResize(2, Eigen::NoChange);
-  const Eigen::MatrixXd world_changes_m =
-      separation->lamp_derivatives.scale_by_lamp_sds().bottomRows<2>();
+  const MatrixX world_changes_m =
+      set_derivatives(fit, reference_fixes, separation->jacobian_wrt_fixes).bottomRows<2>();
   fit.world_offset_m = separation->world_m;
   fit.world_covariance = factor * separation->covariance.bottomRightCorner<2, 2>() +
                          world_changes_m * world_changes_m.transpose();
@@ -110,18 +121,18 @@ JointCovariance append_offset(JointCovariance joint, const DispersionFit& fit,
   return joint;
 }
 
-DispersionFit estimate_dispersion(std::span<const ReferencePointCapture> captures,
-                                  const LampMap& map, const Calibration& calibration,
-                                  DispersionMethod method, DispersionCircle circle) {
-  const ReferencePointFixes reference_fixes(captures, map, calibration);
+namespace {
+
+/// Estimates the offset from the captures of the fit.
+void estimate_offset(DispersionFit& fit, const LampMap& map, const Calibration& calibration,
+                     DispersionMethod method, DispersionCircle circle) {
+  const ReferencePointFixes reference_fixes(fit.captures, map, calibration);
   const OptionalFixes fixes = reference_fixes.locate_with_offset({0, 0});
   const auto count =
       std::count_if(fixes.begin(), fixes.end(), [](const auto& fix) { return fix.has_value(); });
-  DispersionFit fit;
   fit.captures_without_fix = static_cast<int>(std::ssize(fixes) - count);
-  fit.no_fix_status = reference_fixes.first_failure();
-  fit.noise_is_stated = all_have_sigma(captures);
-  if (count == 0) return fit;
+  fit.fixes.clear();
+  if (count == 0) return;
   const bool paper = method == DispersionMethod::chen_guan;
   const std::vector<bool> all(fixes.size(), true);
   if (are_all_fixes_far(fixes)) {
@@ -138,7 +149,40 @@ DispersionFit estimate_dispersion(std::span<const ReferencePointCapture> capture
       fit_camera_offset(fit, reference_fixes, circle);
     }
   }
+}
+
+}  // namespace
+
+DispersionFit estimate_dispersion(std::span<const ReferencePointCapture> captures,
+                                  const LampMap& map, const Calibration& calibration,
+                                  DispersionMethod method, DispersionCircle circle) {
+  DispersionFit fit;
+  fit.captures.assign(captures.begin(), captures.end());
+  fit.no_fix_status = remove_outlier_lamps(fit.captures, map, calibration);
+  fit.noise_is_stated = all_have_sigma(captures);
+  estimate_offset(fit, map, calibration, method, circle);
+  if (fit.status == DispersionStatus::ok &&
+      scale_contradicted_noise(fit.captures, map, calibration, fit.dispersion.offset_px))
+    estimate_offset(fit, map, calibration, method, circle);
   return fit;
+}
+
+std::optional<Eigen::Vector2d> predict_offset(const DispersionFit& fit,
+                                              const Eigen::Vector2d& focal_px,
+                                              std::span<const ReferencePointCapture> captures,
+                                              const LampMap& map, const Calibration& calibration) {
+  const Eigen::Vector2d offset = fit.dispersion.offset_px.cwiseQuotient(focal_px);
+  const OptionalFixes fixes =
+      ReferencePointFixes(captures, map, calibration)
+          .locate_with_offset(offset.cwiseProduct(calibration.camera.focal_px()));
+  Eigen::Vector2d change_px = Eigen::Vector2d::Zero();
+  for (const DispersionFit::ReferencePointFix& fix : fit.fixes) {
+    if (!fix.used) continue;
+    if (!fixes[fix.capture]) return std::nullopt;
+    change_px += fit.jacobian_wrt_fixes.middleCols<2>(2 * static_cast<Eigen::Index>(fix.capture)) *
+                 (fixes[fix.capture]->error_m - fix.after_m);
+  }
+  return offset + change_px.cwiseQuotient(focal_px);
 }
 
 std::string_view describe_status(DispersionStatus status) {

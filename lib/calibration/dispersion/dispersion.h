@@ -75,14 +75,19 @@ struct DispersionFit {
   FixStatus no_fix_status = FixStatus::ok;
   /// True if all detections state their sigma_px.
   bool noise_is_stated = false;
+  /// The captures without the detections of their outlier lamps, and with a larger sigma_px if
+  /// their residuals contradict it.
+  std::vector<ReferencePointCapture> captures = {};
 
   /// Offset; the circle is that of `before`.
   Dispersion dispersion = {{0, 0}, 0, {0, 0}, 0};
   /// Covariance of offset_px in px^2 with exact lens, zenith, lever arm and map, from the scatter
-  /// of the fixes and their noise (compute_variance_factor()); derivatives of
-  /// offset_px with respect to the lamps. Absent for the enclosing circle.
+  /// of the fixes and their noise (compute_variance_factor()); derivatives of offset_px with
+  /// respect to the lamps, and to the fixes of all captures (two columns each). Absent for the
+  /// enclosing circle.
   std::optional<Matrix2> covariance = {};
   LampDerivatives lamp_derivatives = {};
+  Eigen::Matrix2Xd jacobian_wrt_fixes = {};
   /// Mean error of the corrected fixes, fixed in the world: fix minus reference point. Caused by
   /// errors of the reference point or the lamp map. Absent for method `chen_guan`, which assumes
   /// that it is zero.
@@ -139,5 +144,17 @@ DispersionFit estimate_dispersion(std::span<const ReferencePointCapture> capture
                                   const LampMap& map, const Calibration& calibration,
                                   DispersionMethod method,
                                   DispersionCircle circle = DispersionCircle::mean);
+
+/// Predicts offset_px / f for slightly different reference points or another calibration, to first
+/// order: with the same fixes used, their changes times `jacobian_wrt_fixes`.
+///
+/// @param fit       has a covariance
+/// @param focal_px  focal lengths of the calibration of `fit`
+/// @param captures  those of `fit`; only their reference points may differ
+/// @return std::nullopt if a used capture has no fix
+std::optional<Eigen::Vector2d> predict_offset(const DispersionFit& fit,
+                                              const Eigen::Vector2d& focal_px,
+                                              std::span<const ReferencePointCapture> captures,
+                                              const LampMap& map, const Calibration& calibration);
 
 }  // namespace vlp

@@ -146,20 +146,16 @@ std::optional<bool> solve_without_outliers(const ReferencePointFixes& fixes, Off
   return std::nullopt;
 }
 
-/// Propagates errors of the map. The solution changes by -(J'WJ)^-1 J'W d, where d are the changes
-/// of the fixes.
-LampDerivatives propagate_map_errors(const ReferencePointFixes& fixes, const OffsetSeparation& at) {
-  LampDerivatives derivatives = fixes.differentiate_by_lamps(at.offset_px);
-  if (derivatives.lamps.empty()) return derivatives;
-  const Eigen::MatrixXd& d_fixes = derivatives.jacobian_wrt_positions;
-  Eigen::MatrixXd gradient = Eigen::MatrixXd::Zero(4, d_fixes.cols());
+/// Returns the derivative of the solution with respect to the fixes, -(J'WJ)^-1 J'W.
+Eigen::Matrix4Xd differentiate_by_fixes(const ReferencePointFixes& fixes,
+                                        const OffsetSeparation& at) {
+  Eigen::Matrix4Xd jacobian = Eigen::Matrix4Xd::Zero(4, 2 * std::ssize(at.used));
   for (const Equation& equation : linearize_fixes(fixes, at)) {
     if (!at.used[equation.capture]) continue;
-    const auto row = 2 * static_cast<Eigen::Index>(equation.capture);
-    gradient += equation.jacobian.transpose() * equation.whitening * d_fixes.middleRows<2>(row);
+    jacobian.middleCols<2>(2 * static_cast<Eigen::Index>(equation.capture)) =
+        -at.covariance * equation.jacobian.transpose() * equation.whitening;
   }
-  derivatives.jacobian_wrt_positions = -at.covariance * gradient;
-  return derivatives;
+  return jacobian;
 }
 
 }  // namespace
@@ -174,7 +170,7 @@ std::optional<OffsetSeparation> separate_offsets(const ReferencePointFixes& fixe
     if (!changed) return std::nullopt;
     if (!*changed) break;
   }
-  result.lamp_derivatives = propagate_map_errors(fixes, result);
+  result.jacobian_wrt_fixes = differentiate_by_fixes(fixes, result);
   return result;
 }
 
@@ -261,21 +257,17 @@ Eigen::Matrix2d estimate_covariance(const std::vector<Eigen::Vector2d>& errors,
   return l * axes * values.asDiagonal() * axes.transpose() * l.transpose() / n;
 }
 
-/// Computes the derivatives of the offset with respect to the positions of the lamps. The offset
-/// compensates the mean change of the fixes.
-LampDerivatives differentiate_offset(const ReferencePointFixes& reference_fixes,
-                                     const ChenGuanOffset& found,
-                                     const Eigen::Matrix2d& image_from_floor) {
-  LampDerivatives derivatives = reference_fixes.differentiate_by_lamps(found.offset_px);
-  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(2, derivatives.jacobian_wrt_positions.cols());
-  double count = 0;
-  for (std::size_t i = 0; i < found.used.size(); ++i) {
-    if (!found.used[i]) continue;
-    mean += derivatives.jacobian_wrt_positions.middleRows<2>(2 * static_cast<Eigen::Index>(i));
-    ++count;
+/// Returns the derivative of the offset with respect to the fixes. The offset compensates the mean
+/// change of those that are used.
+Eigen::Matrix2Xd differentiate_by_fixes(const std::vector<bool>& used,
+                                        const Eigen::Matrix2d& image_from_floor) {
+  Eigen::Matrix2Xd jacobian = Eigen::Matrix2Xd::Zero(2, 2 * std::ssize(used));
+  const auto count = static_cast<double>(std::ranges::count(used, true));
+  for (std::size_t i = 0; i < used.size(); ++i) {
+    if (used[i])
+      jacobian.middleCols<2>(2 * static_cast<Eigen::Index>(i)) = -image_from_floor / count;
   }
-  derivatives.jacobian_wrt_positions = -image_from_floor * mean / count;
-  return derivatives;
+  return jacobian;
 }
 
 }  // namespace
@@ -323,7 +315,7 @@ ChenGuanOffset estimate_chen_guan_offset(const ReferencePointFixes& reference_fi
       Matrix2 covariance = image_from_floor * mean_covariance_m2 * image_from_floor.transpose();
       covariance(1, 0) = covariance(0, 1);
       found.covariance = covariance;
-      found.lamp_derivatives = differentiate_offset(reference_fixes, found, image_from_floor);
+      found.jacobian_wrt_fixes = differentiate_by_fixes(used, image_from_floor);
     }
     return found;
   }

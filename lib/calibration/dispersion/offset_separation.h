@@ -21,9 +21,9 @@ struct OffsetSeparation {
   /// Covariance of (offset_px, world_m) for fixes that scatter according to their covariances and
   /// an exact map.
   Eigen::Matrix4d covariance;
-  /// Derivatives of (offset_px, world_m) with respect to the positions of the lamps, rows as in
-  /// `covariance`.
-  LampDerivatives lamp_derivatives = {};
+  /// Derivative of (offset_px, world_m) with respect to the fixes of all captures, two columns
+  /// each: zero for those that are not used.
+  Eigen::Matrix4Xd jacobian_wrt_fixes = {};
   /// Variance factor: squared residuals divided by their expectation. It is 0 without redundancy.
   double variance_factor;
   /// Number of rows of the used fixes minus the number of unknowns.
@@ -60,9 +60,8 @@ struct ChenGuanOffset {
   /// Covariance from the scatter of the fixes, at least that of their noise. Absent for the
   /// enclosing circle.
   std::optional<Matrix2> covariance = {};
-  /// Derivatives of offset_px with respect to the positions of the lamps; empty without a
-  /// covariance.
-  LampDerivatives lamp_derivatives = {};
+  /// Derivative of offset_px with respect to the fixes of all captures; empty without a covariance.
+  Eigen::Matrix2Xd jacobian_wrt_fixes = {};
   /// True for each capture whose fix is used.
   std::vector<bool> used = {};
 };

@@ -40,6 +40,14 @@ bool is_rejected(const Fix& fix, int lamp) {
   return std::ranges::count(std::span(fix.rejected_ids).first(count), lamp) > 0;
 }
 
+/// Makes a positioner whose fixes have the covariance of the stated noise alone.
+Positioner make_unchecked_positioner(LampMap map, const Calibration& geometry) {
+  for (Lamp& lamp : map.lamps) lamp.sd_m.reset();
+  PositionerOptions options;
+  options.checks_residuals = false;
+  return Positioner(map, geometry, options);
+}
+
 Fix locate_camera_of_capture(const Positioner& positioner, const ReferencePointCapture& capture) {
   Sensors sensors;
   sensors.inclination = capture.inclination;
@@ -58,19 +66,43 @@ Eigen::MatrixXd LampDerivatives::scale_by_lamp_sds() const {
 
 ReferencePointFixes::ReferencePointFixes(std::span<const ReferencePointCapture> captures,
                                          const LampMap& map, const Calibration& calibration)
-    : captures_(captures.begin(), captures.end()),
-      map_(map),
-      calibration_(remove_dispersion(calibration)) {
-  const Positioner positioner(map_, calibration_);
-  for (ReferencePointCapture& capture : captures_) {
+    : captures_(captures), map_(map), calibration_(extract_geometry(calibration)) {}
+
+FixStatus remove_outlier_lamps(std::vector<ReferencePointCapture>& captures, const LampMap& map,
+                               const Calibration& calibration) {
+  FixStatus first_failure = FixStatus::ok;
+  const Positioner positioner(map, remove_dispersion(calibration));
+  for (ReferencePointCapture& capture : captures) {
     const Fix fix = locate_camera_of_capture(positioner, capture);
     if (fix.has_succeeded()) {
       std::erase_if(capture.detections,
                     [&](const Detection& detection) { return is_rejected(fix, detection.lamp); });
-    } else if (first_failure_ == FixStatus::ok) {
-      first_failure_ = fix.status;
+    } else if (first_failure == FixStatus::ok) {
+      first_failure = fix.status;
     }
   }
+  return first_failure;
+}
+
+bool scale_contradicted_noise(std::vector<ReferencePointCapture>& captures, const LampMap& map,
+                              Calibration calibration, const Eigen::Vector2d& offset_px) {
+  calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1};
+  const Positioner positioner(map, calibration);
+  const Positioner unchecked = make_unchecked_positioner(map, calibration);
+  bool has_changed = false;
+  for (ReferencePointCapture& capture : captures) {
+    const Fix fix = locate_camera_of_capture(positioner, capture),
+              stated = locate_camera_of_capture(unchecked, capture);
+    if (!fix.has_succeeded() || !stated.has_succeeded()) continue;
+    const double factor = std::sqrt(fix.noise_covariance.trace() / stated.noise_covariance.trace());
+    constexpr double rounding = 1e-6;
+    if (!(factor > 1 + rounding)) continue;
+    for (Detection& detection : capture.detections) {
+      if (detection.sigma_px) *detection.sigma_px *= factor;
+    }
+    has_changed = true;
+  }
+  return has_changed;
 }
 
 std::vector<std::optional<ReferencePointFixes::Estimate>> ReferencePointFixes::locate_with_offset(
@@ -82,9 +114,7 @@ std::vector<std::optional<ReferencePointFixes::Estimate>> ReferencePointFixes::l
     const Eigen::Vector2d& offset_px, const LampMap& map) const {
   Calibration calibration = calibration_;
   calibration.dispersion = Dispersion{offset_px, 0, {0, 0}, 1};
-  PositionerOptions options;
-  options.rejects_contradicting_lamps = false;  // the constructor has rejected them
-  const Positioner positioner(map, calibration, options);
+  const Positioner positioner = make_unchecked_positioner(map, calibration);
   std::vector<std::optional<Estimate>> fixes(captures_.size());
   for (std::size_t i = 0; i < captures_.size(); ++i) {
     const Fix fix = locate_camera_of_capture(positioner, captures_[i]);

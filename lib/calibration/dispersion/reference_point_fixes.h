@@ -31,8 +31,8 @@ class ReferencePointFixes {
     int degrees_of_freedom;
   };
 
-  /// Rejects outlier lamps of each capture. All fixes are from the others, so that they are smooth
-  /// functions of offset and map.
+  /// Uses all lamps of the captures, so that fixes are smooth functions of offset, map and
+  /// calibration (remove_outlier_lamps()).
   ReferencePointFixes(std::span<const ReferencePointCapture> captures, const LampMap& map,
                       const Calibration& calibration);
 
@@ -42,18 +42,25 @@ class ReferencePointFixes {
   /// are detected and have an sd_m above zero. Differentiates numerically, one coordinate at a
   /// time. The result has two rows for each capture, which are zero without a fix.
   LampDerivatives differentiate_by_lamps(const Eigen::Vector2d& offset_px) const;
-  /// Returns the status of the first capture without a fix; `ok` if there is none.
-  FixStatus first_failure() const { return first_failure_; }
 
  private:
   std::vector<std::optional<Estimate>> locate_with_offset(const Eigen::Vector2d& offset_px,
                                                           const LampMap& map) const;
 
-  std::vector<ReferencePointCapture> captures_;
+  std::span<const ReferencePointCapture> captures_;
   const LampMap& map_;
   Calibration calibration_;
-  FixStatus first_failure_ = FixStatus::ok;
 };
+
+/// Removes the detections of each capture's outlier lamps. Returns the status of the first capture
+/// without a fix; `ok` if there is none.
+FixStatus remove_outlier_lamps(std::vector<ReferencePointCapture>& captures, const LampMap& map,
+                               const Calibration& calibration);
+
+/// Increases sigma_px of the captures whose residuals contradict it with this offset
+/// (Fix::noise_covariance). Returns true if there are any.
+bool scale_contradicted_noise(std::vector<ReferencePointCapture>& captures, const LampMap& map,
+                              Calibration calibration, const Eigen::Vector2d& offset_px);
 
 /// Fix of each capture, in their order; std::nullopt for captures without a fix.
 using OptionalFixes = std::vector<std::optional<ReferencePointFixes::Estimate>>;
