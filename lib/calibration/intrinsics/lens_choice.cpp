@@ -103,7 +103,8 @@ void compare_with_best(const std::vector<LogSquares>& logs, LensChoice& choice) 
     candidate.max_excess = std::max(candidate.max_excess, max_excess);
 }
 
-/// Returns the largest angle of a corner off the axis.
+}  // namespace
+
 double compute_max_corner_angle_rad(const IntrinsicsSolution& solution) {
   const Lens lens = solution.fitted_lens();
   double smallest = 1;
@@ -115,8 +116,6 @@ double compute_max_corner_angle_rad(const IntrinsicsSolution& solution) {
   return std::acos(smallest);
 }
 
-}  // namespace
-
 std::optional<FisheyeFit> fit_fisheye_lens(const InitialSolutions& initial) {
   constexpr double max_rms_px = 2;
   IntrinsicsSolution solution = solve_intrinsics(initial, LensModel::fisheye);
@@ -125,13 +124,19 @@ std::optional<FisheyeFit> fit_fisheye_lens(const InitialSolutions& initial) {
   return FisheyeFit{std::move(solution), max_corner_angle_rad};
 }
 
+bool may_exceed_right_angle(const InitialSolutions& initial) {
+  constexpr double margin_rad = 0.05;
+  const auto fisheye = initial.solve_first_stages(LensModel::fisheye);
+  return !fisheye || compute_max_corner_angle_rad(*fisheye) >= kRightAngle_rad - margin_rad;
+}
+
 bool is_fisheye_worse(const InitialSolutions& initial, LensModel other) {
-  constexpr double min_square_ratio = 1.5, max_angle_rad = kRightAngle_rad - 0.05;
+  constexpr double min_square_ratio = 1.5;
   const auto fisheye = initial.solve_first_stages(LensModel::fisheye);
   const auto compared = initial.solve_first_stages(other);
   if (!fisheye || !compared || fisheye->views != compared->views) return false;
   const double ratio = fisheye->rms_px / compared->rms_px;
-  return ratio * ratio > min_square_ratio && compute_max_corner_angle_rad(*fisheye) < max_angle_rad;
+  return ratio * ratio > min_square_ratio && !may_exceed_right_angle(initial);
 }
 
 bool may_be_wide_angle(const InitialSolutions& initial) {

@@ -52,13 +52,20 @@ struct LensChoice {
 /// Angle off the axis from which on no OPENCVn has rays.
 inline constexpr double kRightAngle_rad = std::numbers::pi / 2;
 
+/// Returns the largest angle of a corner off the axis.
+double compute_max_corner_angle_rad(const IntrinsicsSolution& solution);
+
+/// Returns false if all corners are certainly less than 90 degrees off the axis: after stage 3 of
+/// solve_intrinsics() for OPENCV_FISHEYE, which takes a quarter of the time of a solve.
+bool may_exceed_right_angle(const InitialSolutions& initial);
+
 /// Fits OPENCV_FISHEYE. Returns std::nullopt if no lens fits the views with an RMS residual of at
 /// most 2 px.
 std::optional<FisheyeFit> fit_fisheye_lens(const InitialSolutions& initial);
 
-/// Returns true if OPENCV_FISHEYE certainly fits the views worse than another model, and if all
-/// corners are certainly less than 90 degrees off the axis. Compares the models after stage 3 of
-/// solve_intrinsics(), which takes a quarter of the time of a solve.
+/// Returns true if OPENCV_FISHEYE certainly fits the views worse than another model, without
+/// corners beyond 90 degrees off the axis (may_exceed_right_angle()). Compares the models after
+/// stage 3.
 ///
 /// The corners are then not yet corrected for curvature and displacement of the edges. Both models
 /// have these errors, so that the ratio of their residuals is closer to 1 than after all stages.

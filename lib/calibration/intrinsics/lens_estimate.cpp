@@ -127,12 +127,11 @@ std::string recommend_model(LensModel requested, const IntrinsicsSolution& other
 }
 
 /// Recommends another model that fits if the requested one does not; empty if there is none.
-std::string explain_no_fit(const InitialSolutions& initial, LensModel requested,
-                           const std::optional<FisheyeFit>& fisheye) {
-  std::string problem = fisheye ? recommend_model(requested, fisheye->solution) : "";
-  double best_px = fisheye ? fisheye->solution.rms_px : kMaxFit_px;
+std::string explain_no_fit(const InitialSolutions& initial, LensModel requested) {
+  std::string problem;
+  double best_px = kMaxFit_px;
   for (const LensModel other : {LensModel::opencv4, LensModel::opencv8, LensModel::fisheye}) {
-    if (other == requested || (other == LensModel::fisheye && fisheye)) continue;
+    if (other == requested) continue;
     const IntrinsicsSolution solution = solve_intrinsics(initial, other);
     if (!solution.has_succeeded() || solution.rms_px >= best_px) continue;
     best_px = solution.rms_px;
@@ -148,20 +147,19 @@ bool is_opencv_model(LensModel model) {
 
 /// Recommends OPENCV_FISHEYE if it fits clearly better, or as well with the board seen nearly as
 /// far off the axis as the rays of the lens reach.
-void recommend_fisheye(const FisheyeFit& fisheye, LensEstimate& result) {
+void recommend_fisheye(const IntrinsicsSolution& fisheye, LensEstimate& result) {
   constexpr double better_ratio = 0.95, equal_ratio = 1.01, min_angle_rad = 1.3;
   const IntrinsicsSolution& solution = result.solution;
   const LensModel model = solution.problem.lens_model;
-  const double max_ratio =
-      fisheye.max_corner_angle_rad < min_angle_rad ? better_ratio : equal_ratio;
-  if (fisheye.solution.rms_px > max_ratio * solution.rms_px) return;
+  const double max_angle_rad = compute_max_corner_angle_rad(fisheye);
+  const double max_ratio = max_angle_rad < min_angle_rad ? better_ratio : equal_ratio;
+  if (fisheye.rms_px > max_ratio * solution.rms_px) return;
   result.better_model = LensModel::fisheye;
   result.warnings.push_back(fmt::format(
       "the board is visible up to {:.0f} degrees off axis; {} fits with {:.3f} px, {} with {:.3f} "
       "px and no rays beyond 90 degrees: use --lens {}",
-      deg_from_rad(fisheye.max_corner_angle_rad), lens_model_name(LensModel::fisheye),
-      fisheye.solution.rms_px, lens_model_name(model), solution.rms_px,
-      lens_model_name(LensModel::fisheye)));
+      deg_from_rad(max_angle_rad), lens_model_name(LensModel::fisheye), fisheye.rms_px,
+      lens_model_name(model), solution.rms_px, lens_model_name(LensModel::fisheye)));
 }
 
 /// Warns of a displacement of the edges that a wrong gap between the tags causes, not a camera.
@@ -218,21 +216,24 @@ bool select_lens_model_for_views(const InitialSolutions& initial, SplitViews& vi
 
 /// Returns the reason why the solver found no lens.
 std::string explain_why_lens_not_found(const InitialSolutions& initial, LensModel requested,
-                                       const std::optional<FisheyeFit>& fisheye,
                                        IntrinsicsStatus status) {
   std::string problem;
-  if (status == IntrinsicsStatus::no_solution)
-    problem = explain_no_fit(initial, requested, fisheye);
+  if (status == IntrinsicsStatus::no_solution) problem = explain_no_fit(initial, requested);
   return problem.empty() ? std::string(describe_status(status)) : problem;
 }
 
-/// Returns the fits of the other models that may describe the lens. Sets are_models_compared.
-std::vector<IntrinsicsSolution> fit_other_models(LensEstimate& result) {
+/// Returns the fits of the other models that may describe the lens. Sets are_models_compared. With
+/// `may_be_fisheye`, recommends OPENCV_FISHEYE.
+std::vector<IntrinsicsSolution> fit_other_models(bool may_be_fisheye, LensEstimate& result) {
   const IntrinsicsSolution& solution = result.solution;
   if (is_splined_lens_model(solution.problem.lens_model)) return {};
   const auto comparison = compare_lens_models(solution);
   result.are_models_compared = comparison.has_value();
-  return comparison ? list_possible_fits(solution, *comparison) : std::vector<IntrinsicsSolution>();
+  if (!comparison) return {};
+  const auto fisheye =
+      std::ranges::find(comparison->candidates, LensModel::fisheye, &LensCandidate::model);
+  if (may_be_fisheye && fisheye->fit) recommend_fisheye(*fisheye->fit, result);
+  return list_possible_fits(solution, *comparison);
 }
 
 /// Returns the region in which the lens is calibrated and each of the other models has rays.
@@ -279,12 +280,13 @@ std::optional<AspectErrorEffect> add_print_uncertainty(double print_sd, LensEsti
   return print;
 }
 
-/// Adds the uncertainty of a solution. `print_sd` is Board::print_sd.
-void add_uncertainty(const SplitViews& views, double print_sd, LensEstimate& result) {
+/// Adds the uncertainty of a solution. `print_sd` is Board::print_sd; see fit_other_models().
+void add_uncertainty(const SplitViews& views, double print_sd, bool may_be_fisheye,
+                     LensEstimate& result) {
   const IntrinsicsSolution& solution = result.solution;
   const auto uncertainties =
       ProjectionUncertainty::compare_corners_and_tags(solution, views.solved.lattice);
-  const std::vector<IntrinsicsSolution> others = fit_other_models(result);
+  const std::vector<IntrinsicsSolution> others = fit_other_models(may_be_fisheye, result);
   result.report =
       make_lens_report(solution, views.solved, uncertainties, compute_region(solution, others));
   result.coverage = measure_view_coverage(solution, views.solved);
@@ -338,9 +340,10 @@ LensEstimate estimate_lens(LensViews input) {
       return result;
     }
   }
-  std::optional<FisheyeFit> fisheye;
-  if (!result.choice && is_opencv_model(model) && may_be_wide_angle(initial)) {
-    if (!is_fisheye_worse(initial, model)) fisheye = fit_fisheye_lens(initial);
+  const bool may_be_fisheye =
+      !result.choice && is_opencv_model(model) && may_be_wide_angle(initial);
+  if (may_be_fisheye && may_exceed_right_angle(initial)) {
+    const auto fisheye = fit_fisheye_lens(initial);
     if (fisheye && fisheye->max_corner_angle_rad >= kRightAngle_rad) {
       fail_undetermined(
           result, views,
@@ -354,7 +357,7 @@ LensEstimate estimate_lens(LensViews input) {
   result.solution = solve_intrinsics(initial, model);
   if (!result.solution.has_succeeded()) {
     fail_undetermined(result, views,
-                      explain_why_lens_not_found(initial, model, fisheye, result.solution.status));
+                      explain_why_lens_not_found(initial, model, result.solution.status));
     if (result.solution.status == IntrinsicsStatus::too_few_views) {
       result.status = LensStatus::too_few_views;
     }
@@ -370,8 +373,7 @@ LensEstimate estimate_lens(LensViews input) {
   }
   warn_about_views(result);
   warn_about_edges(result.solution, result);
-  add_uncertainty(views, input.board.print_sd, result);
-  if (fisheye) recommend_fisheye(*fisheye, result);
+  add_uncertainty(views, input.board.print_sd, may_be_fisheye, result);
   return result;
 }
 

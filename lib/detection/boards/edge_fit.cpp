@@ -342,7 +342,7 @@ std::optional<EdgeFit> fit(EdgeCurve& edge, const std::vector<EdgePixel>& pixels
   const double max_level = is_saturated ? censoring_level : std::numeric_limits<double>::infinity();
   const Edge<terms> model(pixels, prior, max_level);
   // Blur, contrast and position of a saturated step are strongly correlated: slow convergence.
-  const EdgeFitLimits limits = is_saturated ? EdgeFitLimits{60, 1e-6} : EdgeFitLimits{15, 1e-3};
+  const EdgeFitLimits limits = is_saturated ? EdgeFitLimits{60, 1e-6} : EdgeFitLimits{15, 1e-2};
   const auto equations = minimize_residuals(model, p, limits);
   edge.coefficients.setZero();
   edge.coefficients.head<terms>() = p.template tail<terms>();

@@ -28,9 +28,11 @@ namespace {
 
 using testing::AllOf;
 using testing::ElementsAre;
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::SizeIs;
+using testing::StartsWith;
 
 constexpr double kViewNoise_px = 0.05;
 
@@ -327,15 +329,10 @@ TEST(EstimateLens, RecommendsFisheyeThatFitsClearlyBetterAndAddsModelUncertainty
   ASSERT_TRUE(result.has_succeeded()) << result.problem;
   EXPECT_EQ(result.better_model, LensModel::fisheye);
   const IntrinsicsInput solver_input = make_solver_input(result, input.board);
-  const auto fisheye = fit_fisheye_lens(InitialSolutions(solver_input));
-  ASSERT_TRUE(fisheye);
   EXPECT_THAT(result.warnings,
-              ElementsAre(fmt::format(
-                  "the board is visible up to {:.0f} degrees off axis; OPENCV_FISHEYE fits with "
-                  "{:.3f} px, LENSMODEL_OPENCV5 with {:.3f} px and no rays beyond 90 degrees: use "
-                  "--lens OPENCV_FISHEYE",
-                  deg_from_rad(fisheye->max_corner_angle_rad), fisheye->solution.rms_px,
-                  result.solution.rms_px)));
+              ElementsAre(AllOf(StartsWith("the board is visible up to 60 degrees off axis; "
+                                           "OPENCV_FISHEYE fits with 0.0"),
+                                EndsWith("use --lens OPENCV_FISHEYE"))));
   // Another model folds nearer to the center.
   const CalibrationReport report = make_lens_report(
       result.solution, solver_input,
