@@ -278,5 +278,33 @@ TEST(DescribeDispersionStatus, DescribesEachStatusDifferently) {
   }
 }
 
+/// Both methods, other focal lengths and other reference points.
+TEST(PredictOffset, MatchesEstimateWithOtherInputs) {
+  for (const DispersionMethod method : {DispersionMethod::camera, DispersionMethod::chen_guan}) {
+    NoisyStation station;
+    station.noisy = method == DispersionMethod::camera
+                        ? station.captures(7, true, {0.004, -0.003}, 0.1)
+                        : station.captures_at(0.3, 6, 0.1);
+    station.add_noise(55);
+    const DispersionFit fit = station.fit(method);
+    ASSERT_EQ(fit.status, DispersionStatus::ok);
+    const Eigen::Vector2d focal_px = station.believed.camera.focal_px();
+    std::vector<ReferencePointCapture> captures = fit.captures;
+    captures[2].reference_point_m += Eigen::Vector2d(2e-5, -3e-5);
+    station.believed.camera.intrinsics[0] += 0.05;
+    station.believed.camera.intrinsics[3] += 0.02;
+    const auto predicted =
+        predict_offset(fit, focal_px, captures, station.rig.map, station.believed);
+    station.noisy = captures;
+    const DispersionFit other = station.fit(method);
+    ASSERT_TRUE(predicted && other.status == DispersionStatus::ok);
+    const Eigen::Vector2d before = fit.dispersion.offset_px.cwiseQuotient(focal_px),
+                          expected = other.dispersion.offset_px.cwiseQuotient(
+                              station.believed.camera.focal_px());
+    EXPECT_GT((expected - before).norm(), 1e-6);
+    EXPECT_THAT(*predicted, IsNear(expected, 0.01 * (expected - before).norm()));
+  }
+}
+
 }  // namespace
 }  // namespace vlp

@@ -8,6 +8,8 @@
 
 #include "calibration/rotation/spot.h"
 #include "geometry/angles.h"
+#include "rig/calibration_error.h"
+#include "support/least_squares_oracle.h"
 #include "support/matchers.h"
 
 namespace vlp {
@@ -85,6 +87,37 @@ TEST(FitRotationAxis, ReturnsExactAxisForRandomScenes) {
     scene.arc_rad = random.uniform(2.2, 6);
     expect_exact(scene);
   }
+}
+
+/// The joint covariance of a lens with independent intrinsics has the derivatives of the fit with
+/// respect to them.
+TEST(FitRotationAxis, PropagatesErrorsOfLensLikeFitsWithOtherLenses) {
+  RotationScene scene;
+  scene.tilt_rad = rad_from_deg(3);
+  scene.lever_arm_m = {0.02, -0.03};
+  scene.heights_m = {0, 0.3};
+  const auto frames = scene.frames(0.1);
+  const auto solve = [&](const Eigen::VectorXd& intrinsics) -> Eigen::VectorXd {
+    Camera camera = scene.camera;
+    camera.intrinsics.assign(intrinsics.begin(), intrinsics.end());
+    const RotationCenter center =
+        fit_rotation_axis(detect_pivots(frames, scene.map, camera), camera).center;
+    Eigen::VectorXd solution(4);
+    solution << compute_zenith_point(center), center.lever_arm_m.value();
+    return solution;
+  };
+  const Eigen::VectorXd intrinsics = Eigen::Map<const Eigen::VectorXd>(
+      scene.camera.intrinsics.data(), std::ssize(scene.camera.intrinsics));
+  const Eigen::Index count = intrinsics.size();
+  const Eigen::MatrixXd jacobian = differentiate_numerically(solve, intrinsics, 1e-3);
+  const RotationFit fit =
+      fit_rotation_axis(detect_pivots(frames, scene.map, scene.camera), scene.camera,
+                        MatrixX(0.01 * MatrixX::Identity(count, count)));
+  ASSERT_TRUE(fit.converged && fit.covariance && fit.joint_covariance);
+  ASSERT_EQ(fit.joint_covariance->rows(), count + 4);
+  expect_relatively_near(fit.joint_covariance->bottomLeftCorner(4, count), 0.01 * jacobian, 0.01);
+  expect_relatively_near(fit.joint_covariance->bottomRightCorner(4, 4),
+                         *fit.covariance + 0.01 * jacobian * jacobian.transpose(), 0.01);
 }
 
 }  // namespace
