@@ -66,7 +66,7 @@ TEST_F(FloorPlotTest, NamesSystemErrorWhenGnuplotScriptCannotBeCreated) {
   const std::string refusal =
       rejection_message([&] { write_floor_plot(folder / "a.png", plot, lamps); });
   ASSERT_EQ(::setrlimit(RLIMIT_NOFILE, &before), 0);
-  EXPECT_THAT(refusal, HasSubstr("a.png: cannot be drawn: gnuplot's script cannot be made: "
+  EXPECT_THAT(refusal, HasSubstr("a.png: cannot be drawn: gnuplot cannot be started: "
                                  "Too many open files"));
 }
 
