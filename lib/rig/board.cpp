@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "rig/file.h"
+#include "rig/yaml_documents.h"
 #include "rig/yaml_parts.h"
 #include "rig/yaml_writer.h"
 
@@ -186,8 +187,12 @@ Board read_board(const std::filesystem::path& file) {
   return result.board;
 }
 
+std::string format_board(const Board& board) {
+  return format_document(kBoardFormat, BoardFile{board});
+}
+
 void write_board(const std::filesystem::path& file, const Board& board) {
-  write_file(file, format_document(kBoardFormat, BoardFile{board}));
+  write_file(file, format_board(board));
 }
 
 }  // namespace vlp

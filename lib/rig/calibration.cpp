@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "rig/calibration_error.h"
-#include "rig/calibration_text.h"
 #include "rig/file.h"
+#include "rig/yaml_documents.h"
 #include "rig/yaml_parts.h"
 #include "rig/yaml_writer.h"
 

@@ -12,6 +12,7 @@
 #include "rig/find_lamp.h"
 #include "rig/input_error.h"
 #include "rig/lamp_map_file.h"
+#include "rig/yaml_documents.h"
 #include "rig/yaml_parts.h"
 #include "rig/yaml_writer.h"
 
@@ -121,8 +122,10 @@ LampMapFile read_lamps_and_rooms(const std::filesystem::path& file, const std::s
                    "has no lamp with 'room: " + room + "': name another room, or correct the map");
 }
 
+std::string format_lamp_map(const LampMap& map) { return format_document(kLampsFormat, map); }
+
 void write_lamp_map(const std::filesystem::path& file, const LampMap& map) {
-  write_file(file, format_document(kLampsFormat, map));
+  write_file(file, format_lamp_map(map));
 }
 
 }  // namespace vlp

@@ -13,6 +13,7 @@
 #include <string_view>
 #include <vector>
 
+#include "../geometry/angles.h"
 #include "yaml_description.h"
 
 // Not installed, and not exported by the shared library.
@@ -87,6 +88,9 @@ class YamlWriter {
 /// Lists are on one line, those of mappings on a line for each (kSpansLines).
 void write_value(YamlWriter& out, double value);
 inline void write_value(YamlWriter& out, double value, const Range&) { write_value(out, value); }
+inline void write_value(YamlWriter& out, double value_rad, const DegreeRange&) {
+  write_value(out, deg_from_rad(value_rad));
+}
 inline void write_value(YamlWriter& out, int value) { out << value; }
 inline void write_value(YamlWriter& out, int value, const Range&) { out << value; }
 inline void write_value(YamlWriter& out, bool value) { out << value; }

@@ -12,7 +12,9 @@
 #include "geometry/angles.h"
 #include "rig/input_error.h"
 #include "rig/lamp_map_file.h"
+#include "rig/yaml_documents.h"
 #include "rig/yaml_reader.h"
+#include "rig/yaml_writer.h"
 #include "station/database_name.h"
 
 namespace vlp {
@@ -157,7 +159,8 @@ void check_pattern(const std::string& pattern, const YamlField& field) {
 
 }  // namespace
 
-static void describe(YamlMap& io, CompletionCriteria& sufficient) {
+template <typename Io>
+static void describe(Io& io, Described<Io, CompletionCriteria> sufficient) {
   io.optional("board_views", sufficient.board_views, kCount);
   io.optional("board_coverage", sufficient.board_coverage, kShare);
   io.optional("turn_captures", sufficient.rotation_captures, kCount);
@@ -167,8 +170,9 @@ static void describe(YamlMap& io, CompletionCriteria& sufficient) {
   io.optional("check_captures", sufficient.check_captures, kCount);
 }
 
-static void describe_rejection(YamlMap& io, StationConfig& config) {
-  FrontendOptions& limits = config.frontend;
+template <typename Io>
+static void describe_rejection(Io& io, Described<Io, StationConfig> config) {
+  auto& limits = config.frontend;
   io.optional("blur_fraction", limits.max_blur_fraction, Range{0, 0.1, "(share)"});
   io.optional("dark_fraction", limits.min_bright_fraction, kShare);
   io.optional("white_fraction", limits.max_white_fraction, kShare);
@@ -234,7 +238,7 @@ static void describe_targets(YamlMap& io, StationConfig& config, const Files& fi
 /// Describes the conditions of a verdict: completion, rejection of images, gates and golden unit.
 static void describe_verdict(YamlMap& io, StationConfig& config, const Files& files) {
   io.optional("completion", config.completion);
-  io.optional("rejection", config, describe_rejection);
+  io.optional("rejection", config, describe_rejection<YamlMap>);
   config.gates = read_gates(io.require("gates"), list_unit_metrics());
   io.optional("guard_bands", config, describe_bands);
   io.optional("golden", config.golden_unit, files);
@@ -257,6 +261,38 @@ static void describe(YamlMap& io, StationConfig& config, const Files& files) {
   io.optional("spool", config.spool, files);
   io.optional("retention", config.retention);
   io.optional("hook", config.hook, files);
+}
+
+static void describe(YamlWriter& io, const Gate& gate) {
+  io.required("metric", gate.metric);
+  io.required("limit", gate.limit);
+  if (!gate.guard_band) return;
+  io.required("standard_uncertainty", gate.guard_band->standard_uncertainty);
+  io.required("k", gate.guard_band->k);
+}
+
+static void describe(YamlWriter& io, const GoldenUnit& golden) {
+  io.required("camera_id", golden.camera_id);
+  io.required("calibration", format_calibration(golden.calibration));
+  io.required("gates", golden.gates);
+}
+
+std::string hash_settings(const StationConfig& config) {
+  Calibration type;
+  type.camera = config.nominal_camera;
+  LampMap lamps = config.lamps;
+  std::ranges::sort(lamps.lamps, {}, &Lamp::id);
+  YAML::Emitter text;
+  YamlWriter io(text);
+  io.begin_map();
+  io.optional("dispersion_position_m", config.dispersion_position_m);
+  io.required("completion", config.completion);
+  describe_rejection(io, config);
+  io.required("gates", config.gates);
+  io.optional("golden", config.golden_unit);
+  io.end_map();
+  return hash_text(format_calibration(type) + format_board(config.board) + format_lamp_map(lamps) +
+                   text.c_str());
 }
 
 std::string describe_camera_id_problem(const std::string& camera_id) {

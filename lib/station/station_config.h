@@ -128,4 +128,13 @@ std::vector<MetricKind> list_unit_metrics();
 /// - a camera type or a golden unit without row time or readout.
 StationConfig read_station_config(const std::filesystem::path& file);
 
+/// Computes the SHA-256 of the parsed configuration that affects measurements and verdicts.
+///
+///   included  camera type, board, lamp map, position, completion and rejection limits, gates with
+///             guard bands, golden unit
+///   excluded  name of the station, `verify_due`, serials, folders, records, spool, hook, retention
+///
+/// Format, comments, order and names of files do not change it.
+std::string hash_settings(const StationConfig& config);
+
 }  // namespace vlp

@@ -11,8 +11,8 @@
 #include <random>
 
 #include "rig/calibration_error.h"
-#include "rig/calibration_text.h"
 #include "rig/samples.h"
+#include "rig/yaml_documents.h"
 #include "support/rejection_message.h"
 
 namespace vlp {

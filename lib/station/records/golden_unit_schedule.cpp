@@ -8,14 +8,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <initializer_list>
 #include <sstream>
 #include <system_error>
-#include <utility>
 
 #include "captures/digest.h"
 #include "captures/shared_folder.h"
-#include "rig/calibration_text.h"
 #include "rig/input_error.h"
 #include "station/station_folders.h"
 
@@ -58,105 +55,7 @@ void append_line_to_note(const SharedFolder& spool, const std::string& note,
   if (!is_written) throw InputError(spool.folder_path() / note, "cannot be written");
 }
 
-/// Text of names and values, one per line. Numbers have the shortest text that is parsed to the
-/// same value; texts are preceded by their length.
-class Lines {
- public:
-  void add(const char* name, double value) { text_ += fmt::format("{} {}\n", name, value); }
-  void add(const char* name, const std::string& value) {
-    text_ += fmt::format("{} {}:{}\n", name, value.size(), value);
-  }
-  void add(const char* name, const std::optional<double>& value) {
-    if (value) add(name, *value);
-  }
-  void add(std::initializer_list<std::pair<const char*, double>> values) {
-    for (const auto& [name, value] : values) add(name, value);
-  }
-  const std::string& text() const { return text_; }
-
- private:
-  std::string text_;
-};
-
-void add_board(const Board& board, Lines& lines) {
-  lines.add("board", board.family);
-  lines.add("id_order", id_order_name(board.id_order));
-  lines.add({{"kind", static_cast<double>(board.kind)},
-             {"cols", board.cols},
-             {"rows", board.rows},
-             {"tag_size_m", board.tag_size_m},
-             {"tag_spacing", board.tag_spacing},
-             {"border_bits", board.border_bits},
-             {"corner_squares", board.corner_squares ? 1 : 0},
-             {"first_id", board.first_id},
-             {"square_size_m", board.square_size_m},
-             {"top_left_white", board.top_left_white ? 1 : 0}});
-}
-
-void add_lamps(LampMap map, Lines& lines) {
-  std::ranges::sort(map.lamps, {}, &Lamp::id);
-  for (const Lamp& lamp : map.lamps) {
-    lines.add({{"lamp", lamp.id},
-               {"x_m", lamp.position_m.x()},
-               {"y_m", lamp.position_m.y()},
-               {"z_m", lamp.position_m.z()}});
-    const LampShape& shape = lamp.shape;
-    const bool is_disc = shape.kind == ShapeKind::disc;
-    if (is_disc && shape.size_m) lines.add("diameter_m", shape.size_m->x());
-    lines.add("frequency_hz", lamp.frequency_hz);
-    lines.add("duty", lamp.duty);
-    lines.add("sd_m", lamp.sd_m);
-    if (is_disc) continue;
-    lines.add("shape", std::string(get_lamp_shape_traits(shape.kind).name));
-    lines.add({{"length_m", shape.size_m->x()},
-               {"width_m", shape.size_m->y()},
-               {"yaw_rad", shape.yaw_rad}});
-  }
-}
-
-void add_gates(const std::vector<Gate>& gates, Lines& lines) {
-  for (const Gate& gate : gates) {
-    lines.add("gate", gate.metric);
-    lines.add("limit", gate.limit);
-    if (!gate.guard_band) continue;
-    lines.add({{"u", gate.guard_band->standard_uncertainty}, {"k", gate.guard_band->k}});
-  }
-}
-
 }  // namespace
-
-std::string hash_settings(const StationConfig& config) {
-  Lines lines;
-  Calibration type;
-  type.camera = config.nominal_camera;
-  lines.add("camera_type", format_calibration(type));
-  add_board(config.board, lines);
-  add_lamps(config.lamps, lines);
-  if (const auto& place_m = config.dispersion_position_m) {
-    lines.add({{"station_x_m", place_m->x()}, {"station_y_m", place_m->y()}});
-  }
-  const CompletionCriteria& completion = config.completion;
-  lines.add({{"board_views", completion.board_views},
-             {"board_coverage", completion.board_coverage},
-             {"turn_captures", completion.rotation_captures},
-             {"turn_heights", completion.rotation_heights},
-             {"turn_arc_rad", completion.rotation_arc_rad},
-             {"dispersion_captures", completion.dispersion_captures},
-             {"check_captures", completion.check_captures}});
-  const FrontendOptions& limits = config.frontend;
-  lines.add({{"blur_fraction", limits.max_blur_fraction},
-             {"dark_fraction", limits.min_bright_fraction},
-             {"same_pose_fraction", limits.same_view_fraction},
-             {"white_fraction", limits.max_white_fraction},
-             {"max_consecutive_rejections", config.max_consecutive_rejections}});
-  add_gates(config.gates, lines);
-  if (const auto& golden = config.golden_unit) {
-    lines.add("golden", golden->camera_id);
-    lines.add("calibration", format_calibration(golden->calibration));
-    add_gates(golden->gates, lines);
-  }
-  return hash_text(lines.text());
-}
 
 std::string describe_golden_problem(const StationConfig& config, GoldenCheckTime at) {
   constexpr const char* verify = "'vlp-station verify' is due";

@@ -9,15 +9,6 @@
 
 namespace vlp {
 
-/// Computes the SHA-256 of the parsed configuration that affects measurements and verdicts.
-///
-///   included  camera type, board, lamp map, position, completion and rejection limits, gates with
-///             guard bands, golden unit
-///   excluded  name of the station, `verify_due`, serials, folders, records, spool, hook, retention
-///
-/// Format, comments, order and names of files do not change it.
-std::string hash_settings(const StationConfig& config);
-
 /// Time at which the state of the golden unit is checked (describe_golden_problem()): at the
 /// first image of a unit, or at its verdict.
 enum class GoldenCheckTime { first_image, verdict };

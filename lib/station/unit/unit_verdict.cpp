@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "captures/digest.h"
-#include "rig/calibration_text.h"
+#include "rig/yaml_documents.h"
 #include "session/row_time_step.h"
 #include "session/session_folder.h"
 #include "station/unit/guidance.h"

@@ -235,6 +235,7 @@ TEST_F(ComputeMeasurementSettingsDigest, ChangesWithSettingsThatAffectMeasuremen
   is_new("lamps.yaml", "lamps:", "sd_m: 0.001\nlamps:");
   is_new("board.yaml", "tag_size_m: 0.02", "tag_size_m: 0.0201");
   is_new("board.yaml", "first_id: 0", "first_id: 30");
+  is_new("board.yaml", "tag_size_m:", "print_sd: 0.001\ntag_size_m:");
   is_new("camera_type.yaml", "row_time_s: 3.0e-05", "row_time_s: 3.1e-05");
   is_new("camera_type.yaml", "-0.25", "-0.24");
   is_new("station.yaml", "board_views: 36", "board_views: 35");

@@ -4,15 +4,19 @@
 
 #include <string>
 
+#include "board.h"
 #include "calibration.h"
+#include "lamp_map.h"
 
 // Not installed, and not exported by the shared library.
 #pragma GCC visibility push(hidden)
 namespace vlp {
 
-/// Formats a calibration as YAML text, format `vlp-calibration/1`: the content of the file of
-/// write_calibration().
+/// Format objects as YAML text: the content of the files of write_calibration(), write_board() and
+/// write_lamp_map().
 std::string format_calibration(const Calibration& calibration);
+std::string format_board(const Board& board);
+std::string format_lamp_map(const LampMap& map);
 
 }  // namespace vlp
 #pragma GCC visibility pop
