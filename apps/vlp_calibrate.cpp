@@ -16,6 +16,7 @@
 #include "program/steps/capture_options.h"
 #include "program/steps/print_session.h"
 #include "session/session.h"
+#include "session/session_gates.h"
 #include "session/session_results.h"
 
 namespace vlp {

@@ -68,10 +68,6 @@ KnownPositions collect_known_positions(const Options& options, const std::vector
                      "no capture has a position; add columns x_m and y_m for these images, or give "
                      "--reference-point");
   }
-  if (places.captures_without_position > 0) {
-    spdlog::warn("{}: {} of {} captures have no position and are ignored; add x_m and y_m", table,
-                 places.captures_without_position, frames.size());
-  }
   return places;
 }
 

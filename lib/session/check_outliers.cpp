@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cstddef>
 
@@ -65,7 +66,83 @@ Outliers collect_outliers(const std::vector<CaptureError>& errors, double min_si
   return found;
 }
 
+/// Horizontal error of a fix from three lamps or more, m, and its yaw.
+struct PositionError {
+  std::size_t fix;
+  Eigen::Vector2d horizontal_m;
+  double yaw_rad;
+};
+
+std::vector<PositionError> list_position_errors(const EvaluationInput& input) {
+  constexpr int min_lamps = 3;
+  std::vector<PositionError> errors;
+  if (input.fixes.rows.empty()) return errors;
+  for (const FixError& error : compute_fix_errors(input, input.fixes).errors) {
+    const FixRow& row = input.fixes.rows[error.fix];
+    if (row.lamps >= min_lamps)
+      errors.push_back({error.fix, error.horizontal_m, row.fix->pose.yaw_rad});
+  }
+  return errors;
+}
+
 }  // namespace
+
+std::string describe_wrong_positions(const EvaluationInput& input) {
+  std::vector<CaptureError> errors;
+  for (const PositionError& error : list_position_errors(input)) {
+    errors.push_back({input.fixes.rows[error.fix].image, error.horizontal_m.norm(), error.fix});
+  }
+  return describe_error_outliers(errors);
+}
+
+std::optional<CommonOffset> find_common_offset(const EvaluationInput& input) {
+  constexpr double max_ratio = 1.0 / 3;
+  const std::vector<PositionError> errors = list_position_errors(input);
+  if (errors.size() < kMinErrors) return std::nullopt;
+  const auto count = static_cast<double>(errors.size());
+  const auto in_camera = [](const PositionError& error) -> Eigen::Vector2d {
+    return Eigen::Rotation2Dd(-error.yaw_rad) * error.horizontal_m;
+  };
+  Eigen::Vector2d camera_offset_m(0, 0), world_offset_m(0, 0);
+  for (const PositionError& error : errors) {
+    camera_offset_m += in_camera(error) / count;
+    world_offset_m += error.horizontal_m / count;
+  }
+  double squares = 0, camera_squares = 0, world_squares = 0;
+  for (const PositionError& error : errors) {
+    squares += error.horizontal_m.squaredNorm();
+    camera_squares += (in_camera(error) - camera_offset_m).squaredNorm();
+    world_squares += (error.horizontal_m - world_offset_m).squaredNorm();
+  }
+  const auto explains = [&](double offset_m, double left, double other_left) {
+    constexpr double max_square_ratio = max_ratio * max_ratio;
+    return offset_m >= kMinOutlierError_m && left <= max_square_ratio * squares &&
+           left <= max_square_ratio * other_left;
+  };
+  if (explains(camera_offset_m.norm(), camera_squares, world_squares)) {
+    return CommonOffset{camera_offset_m, true, errors.size()};
+  }
+  if (explains(world_offset_m.norm(), world_squares, camera_squares)) {
+    return CommonOffset{world_offset_m, false, errors.size()};
+  }
+  return std::nullopt;
+}
+
+std::string describe_common_offset(const CommonOffset& offset) {
+  constexpr double millimeters = 1e3;
+  const Eigen::Vector2d offset_mm = millimeters * offset.offset_m;
+  // [STATION-19] `lamps have moved` | lamps or known points moved | repair the station
+  // [STATION-18] `check are off by` | common offset; if it rotates with the camera (FAIL): camera
+  //   moved since the rotation, or other camera | repair unit or station
+  return fmt::format(
+      "all {} captures of the check are off by {:.1f} mm in one direction of the {} (x {:+.1f} mm, "
+      "y {:+.1f} mm): {}",
+      offset.captures, offset_mm.norm(), offset.in_camera ? "camera" : "room", offset_mm.x(),
+      offset_mm.y(),
+      offset.in_camera
+          ? "it is loose in its housing or on its mount, or the captures are of another camera"
+          : "the known points or the lamps have moved");
+}
 
 std::string describe_error_outliers(const std::vector<CaptureError>& errors_m) {
   const Outliers outliers = collect_outliers(errors_m, kMinOutlierError_m);
@@ -82,6 +159,13 @@ std::string describe_error_outliers(const std::vector<CaptureError>& errors_m) {
       "captures {} have errors up to {:.1f} mm, the others {:.2g} mm: taken at other positions "
       "than those in their table, or by another camera",
       join_images(outliers.captures), max_mm, others_mm);
+}
+
+void add_residual(const Fix& fix, const std::string& image, std::size_t capture,
+                  std::vector<CaptureError>& residuals_px) {
+  constexpr int min_lamps = 3;
+  if (fix.has_succeeded() && fix.lamps >= min_lamps)
+    residuals_px.push_back({image, fix.residual_px, capture});
 }
 
 std::string describe_residual_outliers(const std::vector<CaptureError>& residuals_px) {

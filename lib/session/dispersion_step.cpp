@@ -15,8 +15,19 @@
 #include "report/plots/calibration_plots.h"
 #include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
+#include "session/check_outliers.h"
 
 namespace vlp {
+
+namespace {
+
+std::string describe_missing_positions(std::size_t missing, std::size_t captures) {
+  return fmt::format(
+      "{} of the {} captures have no position: add x_m and y_m to captures.csv or truth.csv",
+      missing, captures);
+}
+
+}  // namespace
 
 KnownPositions collect_known_captures(std::span<const Frame> frames, const CapturesTable& table,
                                       const std::optional<Eigen::Vector2d>& place_m,
@@ -26,17 +37,28 @@ KnownPositions collect_known_captures(std::span<const Frame> frames, const Captu
     const auto entry = table.find(frame.image);
     const Capture capture_entry = entry == table.end() ? Capture{} : entry->second;
     if (capture_entry.x_m && capture_entry.y_m) {
-      places.captures.push_back(
-          {frame.detections, {*capture_entry.x_m, *capture_entry.y_m}, capture_entry.inclination});
+      places.captures.push_back({frame.detections,
+                                 {*capture_entry.x_m, *capture_entry.y_m},
+                                 capture_entry.inclination,
+                                 frame.image});
       places.measured_points.push_back(capture_entry.measured_point);
     } else if (place_m) {
-      places.captures.push_back({frame.detections, *place_m, capture_entry.inclination});
+      places.captures.push_back(
+          {frame.detections, *place_m, capture_entry.inclination, frame.image});
       places.measured_points.push_back(measured_point);
     } else {
       ++places.captures_without_position;
     }
   }
   return places;
+}
+
+StepResult check_known_positions(std::size_t known, std::size_t captures, int required) {
+  StepResult result;
+  if (known > 0 && known >= std::min(captures, static_cast<std::size_t>(required))) return result;
+  result.set_step_failure(StepFailure::wrong_place,
+                          describe_missing_positions(captures - known, captures));
+  return result;
 }
 
 namespace {
@@ -164,6 +186,18 @@ std::optional<JointCovariance> compute_joint_covariance(DispersionResult& result
   return leveled.covariance;
 }
 
+/// Finds captures that do not fit the result, by the residuals of their fixes.
+void find_inconsistent_captures(DispersionResult& result, const KnownPositions& places,
+                                const LampMap& lamps) {
+  const Positioner positioner(lamps, result.calibration);
+  std::vector<CaptureError> residuals_px;
+  for (std::size_t i = 0; i < places.captures.size(); ++i) {
+    const ReferencePointCapture& capture = places.captures[i];
+    add_residual(locate_capture(positioner, capture), capture.image, i, residuals_px);
+  }
+  result.set_inconsistent_captures(describe_residual_outliers(residuals_px));
+}
+
 void warn_about_few_captures(DispersionResult& result, DispersionMethod method) {
   constexpr int min_captures = 4;  // three have only two degrees of freedom
   if (method != DispersionMethod::camera || result.fit.noise_is_stated ||
@@ -211,6 +245,10 @@ DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPosit
   const Calibration leveled = remove_dispersion(input.calibration);
   check_lamp_map(input, leveled, result);
   if (!result.has_succeeded()) return result;
+  if (const std::size_t missing = places.captures_without_position; missing > 0) {
+    result.warnings.push_back(
+        describe_missing_positions(missing, missing + places.captures.size()) + "; ignored");
+  }
   const bool of_axis = std::find(places.measured_points.begin(), places.measured_points.end(),
                                  MeasuredPoint::axis) != places.measured_points.end();
   const auto& center = input.calibration.rotation_center;
@@ -243,6 +281,7 @@ DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPosit
   auto covariance = compute_joint_covariance(result, captures_for, input, leveled);
   result.calibration =
       add_dispersion(input.calibration, fit.dispersion, std::move(covariance), std::move(entry));
+  find_inconsistent_captures(result, places, input.lamps);
   result.drawing = [fit] {
     return draw_dispersion(make_dispersion_plot("Fixes at a reference point", fit));
   };

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "calibration/dispersion/dispersion.h"
@@ -28,6 +29,10 @@ struct KnownPositions {
 KnownPositions collect_known_captures(std::span<const Frame> frames, const CapturesTable& table,
                                       const std::optional<Eigen::Vector2d>& place_m = {},
                                       MeasuredPoint measured_point = MeasuredPoint::camera);
+
+/// Returns a result that fails with wrong_place if no capture has a known position, or if fewer
+/// than `required` have one and others have none.
+StepResult check_known_positions(std::size_t known, std::size_t captures, int required = 1);
 
 /// Result of run_dispersion_step().
 struct DispersionResult : StepResult {

@@ -76,6 +76,7 @@ LensResult run_lens_step(LensInput input, HistoryEntry entry) {
   }
   LensEstimate& lens = result.lens = estimate_lens(std::move(views));
   std::move(lens.warnings.begin(), lens.warnings.end(), std::back_inserter(result.warnings));
+  result.inconsistent_captures = lens.inconsistent_views;
   std::move(lens.details.begin(), lens.details.end(), std::back_inserter(result.details));
   if (lens.status == LensStatus::wrong_board) {
     result.set_step_failure(StepFailure::wrong_board, lens.problem, input.board_file);

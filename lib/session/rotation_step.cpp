@@ -17,6 +17,7 @@
 #include "report/plots/calibration_plots.h"
 #include "rig/calibration_builder.h"
 #include "rig/calibration_error.h"
+#include "session/check_outliers.h"
 #include "session/lamp_captures.h"
 
 namespace vlp {
@@ -162,6 +163,17 @@ MapErrors detect_errors_in_map(const LampCaptures& input, const Calibration& cal
   return found;
 }
 
+/// Finds captures that do not fit the result, by the residuals of their fixes.
+void find_inconsistent_captures(RotationResult& result, const LampCaptures& input) {
+  const Positioner positioner(input.lamps, result.calibration);
+  std::vector<CaptureError> residuals_px;
+  for (std::size_t i = 0; i < input.frames.size(); ++i) {
+    const Frame& frame = input.frames[i];
+    add_residual(positioner.compute_position_fix(frame.detections), frame.image, i, residuals_px);
+  }
+  result.set_inconsistent_captures(describe_residual_outliers(residuals_px));
+}
+
 /// Smallest offset of a lamp that can make a step fail, as seen in the image.
 constexpr double kMinBlame_px = 2.5;
 
@@ -248,6 +260,7 @@ RotationResult run_rotation_step(const LampCaptures& input, RotationMethod metho
   add_warnings(result);
   result.calibration = add_rotation_center(input.calibration, result.fit.center,
                                            std::move(covariance), std::move(entry));
+  find_inconsistent_captures(result, input);
   const std::string title = fmt::format("{}, method {}", camera.id, rotation_method_name(method));
   result.drawing = [title, rotation = result.rotation, circles = result.circles, fit = result.fit,
                     camera] {

@@ -81,14 +81,6 @@ struct SessionObserver {
   std::function<void(const SessionStep& step)> on_step_finished = {};
 };
 
-/// Returns gates that every correct session passes, for the metrics that a step has: they notice a
-/// wrong row time, a rotation or a lens of another camera, and errors that contradict the reported
-/// standard deviations. RMS errors below 5 mm do not, as reference points are measured no better.
-std::vector<Gate> make_step_gates(const std::vector<Metric>& metrics);
-
-/// Returns the metrics of the procedure, which its gates can limit.
-std::vector<MetricKind> list_session_metrics();
-
 /// Runs the whole procedure: calibrates a camera from the folder of a session, checks it, and
 /// writes a report. All outputs are written into `results`, which is created if it does not exist.
 ///

@@ -39,8 +39,12 @@ std::optional<fs::path> find_truth_file(const fs::path& folder) {
 
 std::vector<TruthRow> read_truth_positions(const fs::path& folder) {
   if (fs::exists(folder / "truth.csv")) return read_truth_table(folder / "truth.csv");
+  return list_truth_positions(read_folder_captures(folder));
+}
+
+std::vector<TruthRow> list_truth_positions(const CapturesTable& captures) {
   std::vector<TruthRow> rows;
-  for (const auto& [image, capture] : read_folder_captures(folder)) {
+  for (const auto& [image, capture] : captures) {
     if (!capture.x_m || !capture.y_m || capture.measured_point == MeasuredPoint::axis) continue;
     rows.push_back({image, {*capture.x_m, *capture.y_m}, capture.z_m, capture.yaw_rad});
   }

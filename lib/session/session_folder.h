@@ -34,6 +34,9 @@ std::optional<std::filesystem::path> find_truth_file(const std::filesystem::path
 /// names for captures.csv, which need not have a place for every image.
 /// @pre find_truth_file() returns a file
 std::vector<TruthRow> read_truth_positions(const std::filesystem::path& folder);
+/// Returns the places of the camera in a table, in the order of the image names. Omits captures
+/// without one, and places of the axis of rotation.
+std::vector<TruthRow> list_truth_positions(const CapturesTable& captures);
 
 // clang-format off
 /// Folder with the captures of a camera, which is only read:

@@ -53,6 +53,9 @@ struct StepResult {
   std::vector<CheckedMetric> gates = {};
   /// Warnings of possible errors in the result; notes of decisions; details for a closer analysis.
   std::vector<std::string> warnings = {}, notes = {}, details = {};
+  /// Captures that do not fit the result, such as those of another camera, in one line; also a
+  /// warning. Empty if there are none. An operator at a station has to repeat them.
+  std::string inconsistent_captures = {};
   std::vector<SkippedImage> skipped = {};
   std::vector<RejectedLamp> rejected_lamps = {};
   std::vector<LampOffset> lamp_offsets = {};
@@ -67,6 +70,11 @@ struct StepResult {
     failure = kind;
     message = std::move(text);
     file_to_correct = std::move(file);
+  }
+  /// Sets inconsistent_captures and warns of them, unless `text` is empty.
+  void set_inconsistent_captures(std::string text) {
+    if (!text.empty()) warnings.push_back(text);
+    inconsistent_captures = std::move(text);
   }
 };
 

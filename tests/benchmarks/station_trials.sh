@@ -276,7 +276,7 @@ kinds() {
   tried station-moved "$seed" 'the reference point or the lamp map is wrong'
   unit_again
   rm -f "$work/unit/check/captures.csv" "$work/unit/check/truth.csv"
-  tried no-table "$seed" 'check: captures have no position'
+  tried no-table "$seed" 'captures have no position'
 
   # The images.
   unit_again

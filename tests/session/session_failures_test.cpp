@@ -137,8 +137,8 @@ const SessionFault kFaults[] = {
      [](FaultySession& session) { session.show_boards_in("dispersion"); }},
     {"OneCaptureOfDispersion", "dispersion", StepFailure::undetermined, "",
      [](FaultySession& session) { session.keep_captures("dispersion", 1); }},
-    {"NoPositionsOfDispersion", "dispersion", StepFailure::bad_input,
-     "dispersion: its captures have no positions; add x_m and y_m",
+    {"NoPositionsOfDispersion", "dispersion", StepFailure::wrong_place,
+     "4 of the 4 captures have no position: add x_m and y_m",
      [](FaultySession& session) {
        fs::remove(session.session_file("dispersion/truth.csv"));
        fs::remove(session.session_file("dispersion/captures.csv"));

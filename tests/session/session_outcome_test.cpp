@@ -9,6 +9,7 @@
 #include "captures/fixes_table.h"
 #include "rendered_session.h"
 #include "session/session.h"
+#include "session/session_gates.h"
 
 namespace vlp {
 namespace {
@@ -221,13 +222,14 @@ TEST_F(RunSession, StatesRmsOfGivenCameraIfItHasViews) {
 }
 
 TEST_F(RunSession, WarnsOfDispersionCapturesWithoutPosition) {
-  const std::string warning = "captures ignored: they have no position; add it to captures.csv";
+  const std::string warning =
+      "captures have no position: add x_m and y_m to captures.csv or truth.csv; ignored";
   EXPECT_THAT(find_step(run(), "dispersion").result.warnings, Not(Contains(HasSubstr(warning))));
   fs::remove(session_file("dispersion/truth.csv"));
   edit_session_file("dispersion/captures.csv", "0003.png", "0004.png");
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
-  EXPECT_THAT(find_step(result, "dispersion").result.warnings, Contains("1 of 4 " + warning));
+  EXPECT_THAT(find_step(result, "dispersion").result.warnings, Contains("1 of the 4 " + warning));
   ASSERT_TRUE(result.calibration && result.calibration->dispersion);
   EXPECT_EQ(result.calibration->dispersion->captures, 3);
 }

@@ -23,6 +23,8 @@ struct ReferencePointCapture {
   /// Known horizontal position (x, y) of the camera in the world frame, m: the reference point.
   Eigen::Vector2d reference_point_m;
   std::optional<Inclination> inclination = {};
+  /// Name of the image, for messages.
+  std::string image = {};
 };
 
 /// Method of estimate_dispersion().

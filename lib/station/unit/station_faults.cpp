@@ -4,7 +4,7 @@
 
 #include <fmt/core.h>
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -23,17 +23,6 @@ namespace {
 
 /// Fewer captures determine no fault.
 constexpr std::size_t kMinFrames = 3;
-/// Fewer fixes at known points do not show what is typical of them.
-constexpr std::size_t kMinErrors = 5;
-/// Fix of a capture minus its known point.
-struct PositionError {
-  std::string image;
-  Eigen::Vector2d horizontal_m;
-  double yaw_rad;
-  /// Index of the frame.
-  std::size_t frame;
-};
-
 /// Fix of a frame from three lamps or more.
 struct FrameFix {
   /// Index of the frame.
@@ -50,25 +39,6 @@ std::vector<FrameFix> locate_by_three(std::span<const Frame> frames, const LampM
     if (fix.has_succeeded() && fix.lamps >= 3) located.push_back({i, std::move(fix)});
   }
   return located;
-}
-
-/// Returns the errors of fixes at known points, in the order of the frames.
-std::vector<PositionError> compute_position_errors(std::span<const Frame> frames,
-                                                   const LampMap& map,
-                                                   const Calibration& calibration,
-                                                   const CapturesTable& places) {
-  std::vector<PositionError> errors;
-  for (const auto& [i, fix] : locate_by_three(frames, map, calibration)) {
-    const auto entry = places.find(frames[i].image);
-    if (entry == places.end() || entry->second.measured_point == MeasuredPoint::axis) continue;
-    const Capture& place = entry->second;
-    if (!place.x_m || !place.y_m) continue;
-    const auto& pose = fix.state.pose;
-    errors.push_back({frames[i].image,
-                      pose.position_m.head<2>() - Eigen::Vector2d(*place.x_m, *place.y_m),
-                      pose.yaw_rad, i});
-  }
-  return errors;
 }
 
 constexpr Eigen::Index kFocalAndCenter = 4;
@@ -159,76 +129,6 @@ std::vector<std::string> list_missing_lamps(std::span<const Frame> frames, const
   for (const MapError& error : list_undetected_lamps(frames, map))
     faults.push_back(describe_map_error(error));
   return faults;
-}
-
-std::string explain_wrong_positions(std::span<const Frame> frames, const LampMap& map,
-                                    const Calibration& calibration, const CapturesTable& places) {
-  std::vector<CaptureError> errors;
-  for (const PositionError& error : compute_position_errors(frames, map, calibration, places)) {
-    errors.push_back({error.image, error.horizontal_m.norm(), error.frame});
-  }
-  return describe_error_outliers(errors);
-}
-
-std::string explain_large_residuals(std::span<const Frame> frames, const LampMap& map,
-                                    const Calibration& calibration) {
-  std::vector<CaptureError> residuals;
-  for (const auto& [i, fix] : locate_by_three(frames, map, calibration)) {
-    residuals.push_back({frames[i].image, fix.residual_px, i});
-  }
-  return describe_residual_outliers(residuals);
-}
-
-std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
-                                               const Calibration& calibration,
-                                               const CapturesTable& places) {
-  constexpr double max_ratio = 1.0 / 3;
-  const std::vector<PositionError> errors =
-      compute_position_errors(frames, map, calibration, places);
-  if (errors.size() < kMinErrors) return std::nullopt;
-  const auto count = static_cast<double>(errors.size());
-  const auto in_camera = [](const PositionError& error) -> Eigen::Vector2d {
-    return Eigen::Rotation2Dd(-error.yaw_rad) * error.horizontal_m;
-  };
-  Eigen::Vector2d camera_offset_m(0, 0), world_offset_m(0, 0);
-  for (const PositionError& error : errors) {
-    camera_offset_m += in_camera(error) / count;
-    world_offset_m += error.horizontal_m / count;
-  }
-  double squares = 0, camera_squares = 0, world_squares = 0;
-  for (const PositionError& error : errors) {
-    squares += error.horizontal_m.squaredNorm();
-    camera_squares += (in_camera(error) - camera_offset_m).squaredNorm();
-    world_squares += (error.horizontal_m - world_offset_m).squaredNorm();
-  }
-  const auto explains = [&](double offset_m, double left, double other_left) {
-    constexpr double max_square_ratio = max_ratio * max_ratio;
-    return offset_m >= kMinOutlierError_m && left <= max_square_ratio * squares &&
-           left <= max_square_ratio * other_left;
-  };
-  if (explains(camera_offset_m.norm(), camera_squares, world_squares)) {
-    return CommonOffset{camera_offset_m, true, errors.size()};
-  }
-  if (explains(world_offset_m.norm(), world_squares, camera_squares)) {
-    return CommonOffset{world_offset_m, false, errors.size()};
-  }
-  return std::nullopt;
-}
-
-std::string describe_common_offset(const CommonOffset& offset) {
-  constexpr double millimeters = 1e3;
-  const Eigen::Vector2d offset_mm = millimeters * offset.offset_m;
-  // [STATION-19] `lamps have moved` | lamps or known points moved | repair the station
-  // [STATION-18] `check are off by` | common offset; if it rotates with the camera (FAIL): camera
-  //   moved since the rotation, or other camera | repair unit or station
-  return fmt::format(
-      "all {} captures of the check are off by {:.1f} mm in one direction of the {} (x {:+.1f} mm, "
-      "y {:+.1f} mm): {}",
-      offset.captures, offset_mm.norm(), offset.in_camera ? "camera" : "room", offset_mm.x(),
-      offset_mm.y(),
-      offset.in_camera
-          ? "it is loose in its housing or on its mount, or the captures are of another camera"
-          : "the known points or the lamps have moved");
 }
 
 std::string explain_lens_contradiction(std::span<const Frame> frames, const LampMap& map,

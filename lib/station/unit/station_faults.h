@@ -2,9 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
-#include <cstddef>
-#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -27,42 +24,6 @@ std::vector<std::string> list_lamp_map_faults(std::span<const Frame> frames, con
 /// Returns a message for each lamp of the map that no frame contains, one line each. Empty if all
 /// lamps were detected, and for fewer than three frames.
 std::vector<std::string> list_missing_lamps(std::span<const Frame> frames, const LampMap& map);
-
-/// Describes captures at other places than in their table, or by another camera
-/// (describe_error_outliers()), from fixes of three lamps or more. Returns an empty string
-/// if there are none.
-std::string explain_wrong_positions(std::span<const Frame> frames, const LampMap& map,
-                                    const Calibration& calibration, const CapturesTable& places);
-
-/// Describes captures whose residuals are outliers (describe_residual_outliers()), from fixes of
-/// three lamps or more. Returns an empty string if there are none.
-std::string explain_large_residuals(std::span<const Frame> frames, const LampMap& map,
-                                    const Calibration& calibration);
-
-/// Common offset of all captures at known points.
-struct CommonOffset {
-  /// Fix minus known point: in the frame of the level camera if `in_camera`, otherwise in the
-  /// world.
-  Eigen::Vector2d offset_m;
-  /// True if it rotates with the camera: the camera moved since it was calibrated. Otherwise the
-  /// known points or the lamps moved.
-  bool in_camera;
-  /// Number of captures with a fix.
-  std::size_t captures;
-};
-
-/// Finds an offset of more than 5 mm, without which the errors of captures at known points are a
-/// third or less.
-///
-/// Returns std::nullopt if there is none, and for fewer than five fixes. Returns std::nullopt, too,
-/// if the camera did not rotate between the captures, because the two frames cannot be separated
-/// then.
-std::optional<CommonOffset> find_common_offset(std::span<const Frame> frames, const LampMap& map,
-                                               const Calibration& calibration,
-                                               const CapturesTable& places);
-
-/// Describes an offset with its size and direction, and its possible reasons, in one line.
-std::string describe_common_offset(const CommonOffset& offset);
 
 /// Describes a contradiction between captures of lamps and the calibrated lens; empty if there is
 /// none.

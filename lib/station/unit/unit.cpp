@@ -11,9 +11,11 @@
 #include "captures/digest.h"
 #include "frontend/image_source.h"
 #include "rig/input_error.h"
+#include "session/dispersion_step.h"
+#include "session/rotation_step.h"
 #include "session/session_folder.h"
 #include "station/unit/station_faults.h"
-#include "station/unit/station_steps.h"
+#include "station/unit/unit_metrics.h"
 
 namespace vlp {
 
@@ -35,11 +37,13 @@ ImageUse get_image_use(StationStep step) {
 
 }  // namespace
 
-Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads)
+Unit::Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads,
+           std::optional<Calibration> known_calibration)
     : config_(config),
       camera_id_(std::move(camera_id)),
       program_(std::move(program)),
       threads_(threads),
+      known_calibration_(std::move(known_calibration)),
       boards_(config.board, config.frontend, config.nominal_camera.imager_px) {}
 
 void Unit::reprocess_step(StationStep step) {
@@ -81,17 +85,19 @@ void Unit::solve_in_order(bool all_in) {
       process_files(step, waiting);
       count_rejections(step);
     }
+    if (known_calibration_ && state.images.empty()) continue;
     if (state.result && (state.result->has_succeeded() || !all_in)) continue;
     state.sufficient = has_sufficient_images(step);
     if (!state.sufficient && !all_in) return;
     state.result = compute_step_result(step, all_in);
     state.plot = state.result->drawing ? render_plot_async(state.result->drawing) : StepPlot{};
-    if (!state.result->has_succeeded()) return;
+    if (!state.result->has_succeeded() && !known_calibration_) return;
   }
 }
 
 std::optional<Calibration> Unit::calibration_before(StationStep step) const {
   if (step == StationStep::boards) return Calibration{};
+  if (known_calibration_) return known_calibration_;
   const UnitStep& before = steps_[step_index(step) - 1];
   if (!before.result || !before.result->has_succeeded()) return std::nullopt;
   return before.result->calibration;
@@ -294,41 +300,44 @@ bool Unit::has_sufficient_images(StationStep step) const {
   return false;
 }
 
-StepResult Unit::compute_step_result(StationStep step, bool all_in) const {
+StepResult Unit::run_step(StationStep step, const Calibration& before) const {
   const UnitStep& state = this->step_state(step);
+  if (step == StationStep::boards) {
+    LensInput input{list_observations(state), config_.board, {}, config_.nominal_camera};
+    input.camera.id = camera_id_;
+    LensResult lens = run_lens_step(std::move(input), make_step_entry(step));
+    if (lens.has_succeeded()) add_nominal_differences(config_.nominal_camera, lens);
+    return lens;
+  }
+  const LampCaptures captures{list_used_detections(state), config_.lamps, "lamp map", before};
+  if (step == StationStep::rotation)
+    return run_rotation_step(captures, RotationMethod::axis, make_step_entry(step));
+  const CapturesTable places = read_captures_with_truth(state.folder);
+  if (step == StationStep::check) return run_check_step(config_, before, captures.frames, places);
+  const KnownPositions known =
+      collect_known_captures(captures.frames, places, config_.dispersion_position_m);
+  StepResult result = check_known_positions(known.captures.size(), captures.frames.size(),
+                                            config_.completion.dispersion_captures);
+  if (!result.has_succeeded()) return result;
+  return run_dispersion_step(captures, known, DispersionMethod::camera, DispersionCircle::mean,
+                             make_step_entry(step));
+}
+
+StepResult Unit::compute_step_result(StationStep step, bool all_in) const {
   StepResult result;
-  if (state.count_used_images() == 0) {
+  if (this->step_state(step).count_used_images() == 0) {
     result.set_step_failure(StepFailure::undetermined, "no image can be used");
     return result;
   }
-  const Calibration before = *calibration_before(step);
   try {
-    switch (step) {
-      case StationStep::boards:
-        result = run_station_lens(config_, camera_id_, list_observations(state));
-        break;
-      case StationStep::rotation:
-        result = run_station_rotation(config_, before, list_used_detections(state));
-        break;
-      case StationStep::dispersion:
-        result = run_station_dispersion(config_, before, list_used_detections(state),
-                                        read_captures_with_truth(state.folder));
-        break;
-      case StationStep::check:
-        return run_station_check(config_, before, list_used_detections(state),
-                                 read_captures_with_truth(state.folder));
-    }
+    result = run_step(step, *calibration_before(step));
   } catch (const InputError& error) {  // the table may be incomplete
     if (all_in) throw;
     result.set_step_failure(StepFailure::bad_input, error.what());
-    return result;
   }
-  if (result.has_succeeded()) {
-    HistoryEntry& entry = result.calibration.history.back();
-    const std::string part = entry.part;
-    entry = make_step_entry(step);
-    entry.part = part;
-  }
+  // The operator has to repeat captures that do not fit, such as those of another camera.
+  if (result.has_succeeded() && !result.inconsistent_captures.empty())
+    result.set_step_failure(StepFailure::undetermined, result.inconsistent_captures);
   return result;
 }
 

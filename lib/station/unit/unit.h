@@ -32,7 +32,10 @@ class Unit {
   /// @param config   configuration of the station; must outlive the unit
   /// @param program  program and version for the history of the calibration
   /// @param threads  maximum number of threads
-  Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads);
+  /// @param known_calibration  calibration of the golden unit: each step with images is solved with
+  ///     it, whatever the results of other steps; std::nullopt: a unit that is calibrated
+  Unit(const StationConfig& config, std::string camera_id, ProgramVersion program, int threads,
+       std::optional<Calibration> known_calibration = {});
   Unit(const Unit&) = delete;
   Unit& operator=(const Unit&) = delete;
 
@@ -103,6 +106,7 @@ class Unit {
   void remove_image(StationStep step, const std::string& name);
   void reset_steps_after(StationStep step);
   bool has_sufficient_images(StationStep step) const;
+  StepResult run_step(StationStep step, const Calibration& before) const;
   StepResult compute_step_result(StationStep step, bool all_in) const;
   std::optional<Calibration> calibration_before(StationStep step) const;
   HistoryEntry make_step_entry(StationStep step) const;
@@ -111,6 +115,7 @@ class Unit {
   std::string camera_id_;
   ProgramVersion program_;
   int threads_;
+  std::optional<Calibration> known_calibration_;
   std::string ended_ = {}, invalid_reason_ = {};
   std::function<ImageUser(const std::string&)> owner_ = {};
   BoardIntake boards_;

@@ -13,10 +13,12 @@
 
 #include "captures/digest.h"
 #include "rig/yaml_documents.h"
+#include "session/check_outliers.h"
 #include "session/row_time_step.h"
 #include "session/session_folder.h"
 #include "station/unit/guidance.h"
 #include "station/unit/station_faults.h"
+#include "station/unit/unit_metrics.h"
 
 namespace vlp {
 namespace {
@@ -172,11 +174,13 @@ std::vector<Cause> list_check_faults(const Unit& unit, const Calibration& calibr
   const CapturesWithPositions captures{list_used_detections(check),
                                        read_captures_with_truth(check.folder)};
   // A common offset is no fault of single captures; one that rotates is a fault of the camera.
-  const auto offset = find_common_offset(captures.frames, lamps, calibration, captures.positions);
+  const EvaluationInput input =
+      locate_known_points(unit.station_config(), calibration, captures.frames, captures.positions)
+          .input;
+  const auto offset = find_common_offset(input);
   if (offset && !offset->in_camera) return {{describe_common_offset(*offset)}};
   if (!offset) {
-    std::string fault =
-        explain_wrong_positions(captures.frames, lamps, calibration, captures.positions);
+    std::string fault = describe_wrong_positions(input);
     if (!fault.empty()) return {{std::move(fault)}};
   }
   const UnitStep& dispersion = unit.step_state(StationStep::dispersion);
@@ -225,6 +229,28 @@ std::vector<Cause> list_station_faults(const Unit& unit) {
 
 }  // namespace
 
+std::vector<RunRecord::Image> list_run_images(const Unit& unit) {
+  std::vector<RunRecord::Image> images;
+  for (const StationStep step : kStationSteps) {
+    for (const auto& [name, image] : unit.step_state(step).images) {
+      std::string refused = image.rejection_message();
+      if (image.discarded) refused.append(" (not kept)");
+      images.push_back({.step = station_step_name(step),
+                        .name = name,
+                        .sha256 = image.sha256,
+                        .rejection = std::move(refused)});
+    }
+    for (const auto& file : unit.step_state(step).pending_images) {
+      // [STATION-16] `not looked at:`
+      images.push_back({.step = station_step_name(step),
+                        .name = file.filename().string(),
+                        .sha256 = hash_file(file),
+                        .rejection = "not looked at: a step before is not done"});
+    }
+  }
+  return images;
+}
+
 RunRecord make_unit_record(const Unit& unit, const std::string& run,
                            const ProgramVersion& program) {
   RunRecord record = make_run_record("unit", unit.station_config(), unit.camera_id(), run, program);
@@ -233,23 +259,7 @@ RunRecord make_unit_record(const Unit& unit, const std::string& run,
   }
   record.metrics = unit.collect_metrics();
   record.set_causes(list_failure_causes(unit));
-  for (const StationStep step : kStationSteps) {
-    for (const auto& [name, image] : unit.step_state(step).images) {
-      std::string refused = image.rejection_message();
-      if (image.discarded) refused.append(" (not kept)");
-      record.images.push_back({.step = station_step_name(step),
-                               .name = name,
-                               .sha256 = image.sha256,
-                               .rejection = std::move(refused)});
-    }
-    for (const auto& file : unit.step_state(step).pending_images) {
-      // [STATION-16] `not looked at:`
-      record.images.push_back({.step = station_step_name(step),
-                               .name = file.filename().string(),
-                               .sha256 = hash_file(file),
-                               .rejection = "not looked at: a step before is not done"});
-    }
-  }
+  record.images = list_run_images(unit);
   return record;
 }
 

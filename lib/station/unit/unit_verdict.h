@@ -11,6 +11,9 @@
 
 namespace vlp {
 
+/// Returns the images of all steps with the reasons of rejected ones.
+std::vector<RunRecord::Image> list_run_images(const Unit& unit);
+
 /// Makes the record of a unit's run that ends now, under the run's name `run`.
 RunRecord make_unit_record(const Unit& unit, const std::string& run, const ProgramVersion& program);
 

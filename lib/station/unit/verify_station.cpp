@@ -8,180 +8,108 @@
 #include <functional>
 #include <iterator>
 
-#include "frontend/board_intake.h"
 #include "frontend/image_file.h"
-#include "frontend/image_source.h"
-#include "frontend/lamp_intake.h"
-#include "frontend/observation.h"
 #include "rig/input_error.h"
+#include "session/check_outliers.h"
 #include "session/row_time_step.h"
 #include "session/session_folder.h"
 #include "station/unit/station_faults.h"
-#include "station/unit/station_steps.h"
-#include "station/unit/unit_step.h"
+#include "station/unit/unit.h"
+#include "station/unit/unit_metrics.h"
+#include "station/unit/unit_verdict.h"
 
 namespace vlp {
 namespace {
 
 namespace fs = std::filesystem;
 
-class Verification {
- public:
-  Verification(const StationConfig& config, const fs::path& folder, int threads)
-      : config_(config), golden_(*config.golden_unit), folder_(folder), threads_(threads) {
-    config_.nominal_camera = golden_.calibration.camera;
-  }
+/// Returns the configuration with the golden unit as the type of camera, and with its gates.
+StationConfig make_golden_config(StationConfig config) {
+  config.nominal_camera = config.golden_unit->calibration.camera;
+  config.type_file = "the calibration of the golden unit";
+  config.gates = config.golden_unit->gates;
+  return config;
+}
 
-  void check_boards() {
-    const BoardIntake intake(config_.board, config_.frontend, config_.nominal_camera.imager_px);
-    const UnitStep step =
-        observe_folder(folder_ / "boards", ImageUse::boards,
-                       [&](const SourceImage& image) { return intake.detect_board(image); });
-    if (step.count_used_images() > 0)
-      add_step_result("boards",
-                      run_station_lens(config_, golden_.camera_id, list_observations(step)));
-    add_images(StationStep::boards, step);
+/// Returns the failed steps and gates. The station is under test, and fails by its metrics.
+std::vector<Cause> list_failures(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
+  std::vector<Cause> causes;
+  for (const StationStep step : kStationSteps) {
+    const auto& result = unit.step_state(step).result;
+    if (!result || result->has_succeeded()) continue;
+    const bool is_station_fault =
+        result->failure == StepFailure::wrong_board || result->failure == StepFailure::wrong_map;
+    causes.push_back(
+        {fmt::format("{}: {}", station_step_name(step), result->message), is_station_fault});
   }
+  for (const CheckedMetric& metric : metrics) {
+    if (!metric.has_passed_gate())
+      causes.push_back({describe_failed_gate(metric), metric.value.has_value()});
+  }
+  return causes;
+}
 
-  void check_lamps(StationStep station_step) {
-    const fs::path folder = folder_ / station_step_name(station_step);
-    const LampIntake intake(
-        LightDetector(config_.lamps, make_detector_camera(golden_.calibration)),
-        ImageUse::known_positions, config_.frontend, config_.nominal_camera.imager_px,
-        compute_level_rotations(read_folder_captures(folder), golden_.calibration, 0));
-    const UnitStep step = observe_folder(
-        folder, ImageUse::known_positions,
-        [&](const SourceImage& image) { return intake.detect_lamps_in_image(image); });
-    std::ranges::move(list_observations(step).images, std::back_inserter(lamp_images_));
-    const auto frames = list_used_detections(step);
-    frames_.insert(frames_.end(), frames.begin(), frames.end());
-    const auto places = read_captures_with_truth(step.folder);
-    if (station_step == StationStep::check) {
-      common_offset_ = find_common_offset(frames, config_.lamps, golden_.calibration, places);
-      place_fault_ = explain_wrong_positions(frames, config_.lamps, golden_.calibration, places);
-    }
-    add_step_result(station_step_name(station_step),
-                    station_step == StationStep::check
-                        ? run_station_check(config_, golden_.calibration, frames, places)
-                        : run_station_dispersion(config_, golden_.calibration, frames, places));
-    add_images(station_step, step);
+/// Returns the causes that precede the failed steps and gates.
+std::vector<Cause> list_station_causes(const Unit& unit, const Calibration& calibration,
+                                       bool has_failed) {
+  const StationConfig& config = unit.station_config();
+  std::string row_time_error = unit.row_time_check().error;
+  if (row_time_error.empty() && has_failed) {
+    const Camera& camera = calibration.camera;
+    row_time_error = describe_other_row_time(list_lamp_observations(unit), config.lamps,
+                                             Lens(camera.lens_model, camera.intrinsics),
+                                             make_given_row_time(config));
   }
-
-  RunRecord make_record(const std::string& run, const ProgramVersion& program) {
-    const GivenRowTime stated{*config_.nominal_camera.row_time_s,
-                              "the calibration of the golden unit"};
-    const RowTimeCheck row_time = check_row_time(lamp_images_, config_.lamps, stated);
-    for (const Metric& metric : make_row_time_metrics(row_time)) values_.push_back(metric);
-    RunRecord record = make_run_record("golden", config_, golden_.camera_id, run, program);
-    record.metrics = check_against_gates(golden_.gates, values_, list_unit_metrics());
-    record.images = images_;
-    for (const CheckedMetric& metric : record.metrics) {
-      // The station is under test, and fails by its metrics.
-      if (!metric.has_passed_gate())
-        causes_.push_back({describe_failed_gate(metric), metric.value.has_value()});
-    }
-    std::vector<Cause> causes = list_station_causes(row_time, stated);
-    causes.insert(causes.end(), causes_.begin(), causes_.end());
-    record.set_causes(std::move(causes));
-    return record;
+  const UnitStep& check = unit.step_state(StationStep::check);
+  const std::vector<Frame> check_frames = list_used_detections(check);
+  std::vector<Frame> frames = list_used_detections(unit.step_state(StationStep::dispersion));
+  frames.insert(frames.end(), check_frames.begin(), check_frames.end());
+  // Independent of the gates: this camera is known.
+  constexpr double min_offset_px = 0.6;
+  auto faults = list_lamp_map_faults(frames, config.lamps, calibration, min_offset_px);
+  if (has_failed) {
+    // If all gates pass, they decide whether all lamps must be detected.
+    std::ranges::move(list_missing_lamps(frames, config.lamps), std::back_inserter(faults));
   }
-
-  std::vector<ReportPlot> collect_plots() const {
-    std::vector<ReportPlot> pictures;
-    for (const StepPlot& plot : plots_) {
-      if (const auto& picture = plot.get()) pictures.push_back(*picture);
-    }
-    return pictures;
+  std::vector<Cause> causes;
+  if (!row_time_error.empty()) causes.push_back({row_time_error, false});
+  for (const std::string& fault : faults) causes.push_back({fault, true});
+  if (!faults.empty()) return causes;
+  const EvaluationInput input =
+      locate_known_points(config, calibration, check_frames, read_captures_with_truth(check.folder))
+          .input;
+  const auto offset = find_common_offset(input);
+  if (offset && has_failed) {
+    causes.push_back({describe_common_offset(*offset), true});
+  } else if (std::string fault = describe_wrong_positions(input); !fault.empty()) {
+    causes.push_back({std::move(fault), false});
   }
-
- private:
-  /// Returns the causes that precede the failed steps and gates.
-  std::vector<Cause> list_station_causes(const RowTimeCheck& row_time, const GivenRowTime& stated) {
-    std::string row_time_error = row_time.error;
-    if (row_time_error.empty() && !causes_.empty()) {
-      const Camera& camera = golden_.calibration.camera;
-      row_time_error = describe_other_row_time(lamp_images_, config_.lamps,
-                                               Lens(camera.lens_model, camera.intrinsics), stated);
-    }
-    // Independent of the gates: this camera is known.
-    constexpr double min_offset_px = 0.6;
-    auto faults = list_lamp_map_faults(frames_, config_.lamps, golden_.calibration, min_offset_px);
-    if (!causes_.empty()) {
-      // If all gates pass, they decide whether all lamps must be detected.
-      std::ranges::move(list_missing_lamps(frames_, config_.lamps), std::back_inserter(faults));
-    }
-    std::vector<Cause> causes;
-    if (!row_time_error.empty()) causes.push_back({row_time_error, false});
-    for (const std::string& fault : faults) causes.push_back({fault, true});
-    if (!faults.empty()) return causes;
-    if (common_offset_ && !causes_.empty()) {
-      causes.push_back({describe_common_offset(*common_offset_), true});
-    } else if (!place_fault_.empty()) {
-      causes.push_back({place_fault_, false});
-    }
-    return causes;
-  }
-
-  /// Observes the images of a folder and rejects the repeated ones.
-  template <typename Detect>
-  UnitStep observe_folder(const fs::path& folder, ImageUse use, const Detect& detect) const {
-    const auto files = list_images(folder);
-    std::vector<UnitImage> images(files.size());
-    process_images(files.size(), threads_,
-                   [&](std::size_t i) { images[i] = observe_unit_image(files[i], detect); });
-    UnitStep step;
-    step.folder = folder;
-    Selection selection(use, config_.frontend);
-    for (UnitImage& image : images) {
-      selection.add_or_reject(image.observation);
-      std::string name = image.observation.image_file_name();
-      step.images.emplace(std::move(name), std::move(image));
-    }
-    return step;
-  }
-  void add_step_result(const char* step, const StepResult& result) {
-    if (!result.has_succeeded()) {
-      const bool is_station_fault =
-          result.failure == StepFailure::wrong_board || result.failure == StepFailure::wrong_map;
-      causes_.push_back({fmt::format("{}: {}", step, result.message), is_station_fault});
-    }
-    values_.insert(values_.end(), result.metrics.begin(), result.metrics.end());
-    if (result.drawing) plots_.push_back(render_plot_async(result.drawing));
-  }
-  void add_images(StationStep station_step, const UnitStep& step) {
-    for (const auto& [name, image] : step.images) {
-      images_.push_back({.step = station_step_name(station_step),
-                         .name = name,
-                         .sha256 = image.sha256,
-                         .rejection = image.rejection_message()});
-    }
-  }
-
-  StationConfig config_;
-  const GoldenUnit& golden_;
-  fs::path folder_;
-  int threads_;
-  std::vector<Frame> frames_ = {};
-  std::vector<Observation> lamp_images_ = {};
-  std::vector<Metric> values_ = {};
-  std::vector<StepPlot> plots_ = {};
-  std::vector<Cause> causes_ = {};
-  std::optional<CommonOffset> common_offset_ = {};
-  /// Description of captures of the check at wrong positions.
-  std::string place_fault_ = {};
-  std::vector<RunRecord::Image> images_ = {};
-};
+  return causes;
+}
 
 }  // namespace
 
 VerificationResult verify_from_images(const StationConfig& config, const fs::path& folder,
                                       const std::string& run, const ProgramVersion& program,
                                       int threads) {
-  Verification verification(config, folder, threads);
-  if (fs::is_directory(folder / "boards")) verification.check_boards();
-  if (fs::is_directory(folder / "dispersion")) verification.check_lamps(StationStep::dispersion);
-  verification.check_lamps(StationStep::check);
-  return {verification.make_record(run, program), verification.collect_plots()};
+  const StationConfig golden_config = make_golden_config(config);
+  const auto& [camera_id, calibration, gates] = *config.golden_unit;
+  Unit unit(golden_config, camera_id, program, threads, calibration);
+  for (const StationStep step :
+       {StationStep::boards, StationStep::dispersion, StationStep::check}) {
+    const fs::path images = folder / station_step_name(step);
+    if (step == StationStep::check || fs::is_directory(images))
+      unit.add_step_images(step, list_images(images));
+  }
+  unit.solve_completed(true);
+  RunRecord record = make_run_record("golden", golden_config, camera_id, run, program);
+  record.metrics = unit.collect_metrics();
+  record.images = list_run_images(unit);
+  std::vector<Cause> failures = list_failures(unit, record.metrics);
+  std::vector<Cause> causes = list_station_causes(unit, calibration, !failures.empty());
+  std::ranges::move(failures, std::back_inserter(causes));
+  record.set_causes(std::move(causes));
+  return {std::move(record), unit.collect_plots()};
 }
 
 void invalidate_if_reused(

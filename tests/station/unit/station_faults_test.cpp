@@ -86,69 +86,6 @@ TEST_F(LampFaults, DescribeLampMapFaultsNamesLampOnlyForManyContradictingCapture
   }
 }
 
-/// Positions equal to the fixes, in the table of a check.
-struct PlaceFault : LampFaults {
-  PlaceFault() {
-    const Positioner positioner(map, calibration);
-    for (const Frame& frame : frames) {
-      const Fix fix = positioner.compute_position_fix(frame.detections);
-      if (!fix.has_succeeded()) continue;
-      Capture& place = places[frame.image];
-      place.x_m = fix.state.pose.position_m.x() + 3e-4;
-      place.y_m = fix.state.pose.position_m.y();
-    }
-  }
-  CapturesTable places;
-};
-
-TEST_F(PlaceFault, DescribeWrongReferencePositionsNamesSeveralWrongCaptures) {
-  ASSERT_GT(frames.size(), 12U);
-  CapturesTable wrong = places;
-  for (std::size_t i = 0; i < 5; ++i) wrong.at(frames[i].image).y_m.value() += 0.052;
-  wrong.at(frames[9].image).x_m.value() += 0.03;
-  EXPECT_THAT(explain_wrong_positions(frames, map, calibration, wrong),
-              testing::Eq("captures " + frames[0].image + " to " + frames[4].image + ", " +
-                          frames[9].image +
-                          " have errors up to 52.0 mm, the others 0.3 mm: taken at other positions "
-                          "than those in their table, or by another camera"));
-}
-
-/// If half or more are wrong, the others are not reliable.
-TEST_F(PlaceFault, DescribeWrongReferencePositionsIsEmptyWhenMostAreWrong) {
-  CapturesTable wrong = places;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (i % 4 != 0) wrong.at(frames[i].image).y_m.value() += 0.02;
-  }
-  EXPECT_EQ(explain_wrong_positions(frames, map, calibration, wrong), "");
-}
-
-/// The zenith of another camera displaces all fixes by one offset in the frame of the camera.
-TEST_F(PlaceFault, FindCommonPositionOffsetDistinguishesCameraFromRoomFrame) {
-  EXPECT_FALSE(find_common_offset(frames, map, calibration, places));
-  const Positioner positioner(map, calibration);
-  CapturesTable rotating = places, constant = places, scattered = places;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    const Fix fix = positioner.compute_position_fix(frames[i].detections);
-    if (!fix.has_succeeded()) continue;
-    const double yaw_rad = fix.state.pose.yaw_rad;
-    rotating.at(frames[i].image).x_m.value() += 0.03 * std::cos(yaw_rad);
-    rotating.at(frames[i].image).y_m.value() += 0.03 * std::sin(yaw_rad);
-    constant.at(frames[i].image).x_m.value() += 0.03;
-    scattered.at(frames[i].image).x_m.value() += i % 2 == 0 ? 0.03 : -0.03;
-  }
-  const auto camera_offset = find_common_offset(frames, map, calibration, rotating);
-  ASSERT_TRUE(camera_offset);
-  EXPECT_TRUE(camera_offset->in_camera);
-  EXPECT_THAT(describe_common_offset(*camera_offset),
-              HasSubstr("are off by 30.0 mm in one direction of the camera (x -30.0 mm, y "));
-  const auto world_offset = find_common_offset(frames, map, calibration, constant);
-  ASSERT_TRUE(world_offset);
-  EXPECT_FALSE(world_offset->in_camera);
-  EXPECT_THAT(describe_common_offset(*world_offset),
-              HasSubstr("in one direction of the room (x -30.3 mm, y +0.0 mm): the known points"));
-  EXPECT_FALSE(find_common_offset(frames, map, calibration, scattered));
-}
-
 struct LensFault : ExampleRig {};
 
 TEST_F(LensFault, DescribeContradictionToCalibratedLensIsEmptyForCorrectLens) {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gmock/gmock.h>
 
-#include "station/unit/station_steps.h"
+#include "station/unit/unit_metrics.h"
 #include "support/datasets.h"
 
 namespace vlp {
@@ -11,11 +11,10 @@ namespace {
 using testing::HasSubstr;
 
 /// The example: 36 captures at known points.
-struct StationSteps : testing::Test {
-  StationSteps() {
+struct UnitMetrics : testing::Test {
+  UnitMetrics() {
     config.lamps = read_lamp_map(kExample + "lamps.yaml");
     config.completion.check_captures = 36;
-    config.completion.dispersion_captures = 36;
   }
   StationConfig config{};
   Calibration calibration = read_calibration(kExample + "calibration.yaml");
@@ -23,29 +22,27 @@ struct StationSteps : testing::Test {
   CapturesTable places = read_captures_csv(kExample + "truth.csv");
 };
 
-TEST_F(StationSteps, CheckPositionAccuracyOnStationReturnsFixFractionOneForExactCaptures) {
-  const StepResult result = run_station_check(config, calibration, frames, places);
+TEST_F(UnitMetrics, RunCheckStepReturnsFixFractionOneForExactCaptures) {
+  const StepResult result = run_check_step(config, calibration, frames, places);
   EXPECT_TRUE(result.has_succeeded()) << result.message;
   EXPECT_EQ(result.metrics[0].name, "check_fix_fraction");
   EXPECT_EQ(result.metrics[0].value, 1);
 }
 
-TEST_F(StationSteps, CheckAndDispersionStepsFailForTooFewKnownPositions) {
+TEST_F(UnitMetrics, RunCheckStepFailsForTooFewKnownPositions) {
   places.erase(places.begin());
-  EXPECT_THAT(run_station_check(config, calibration, frames, places).message,
-              HasSubstr("1 of the 36 captures"));
-  EXPECT_THAT(run_station_dispersion(config, calibration, frames, places).message,
+  EXPECT_THAT(run_check_step(config, calibration, frames, places).message,
               HasSubstr("1 of the 36 captures"));
   config.completion.check_captures = 35;
-  EXPECT_TRUE(run_station_check(config, calibration, frames, places).has_succeeded());
-  EXPECT_THAT(run_station_check(config, calibration, {}, places).message,
+  EXPECT_TRUE(run_check_step(config, calibration, frames, places).has_succeeded());
+  EXPECT_THAT(run_check_step(config, calibration, {}, places).message,
               HasSubstr("have no position"));
 }
 
 /// Lamps below their heights in the map: horizontal positions are right, heights are wrong.
-TEST_F(StationSteps, CheckPositionAccuracyOnStationReturnsHeightErrorOfDisplacedLamps) {
+TEST_F(UnitMetrics, RunCheckStepReturnsHeightErrorOfDisplacedLamps) {
   const auto height_mm = [&] {
-    const StepResult result = run_station_check(config, calibration, frames, places);
+    const StepResult result = run_check_step(config, calibration, frames, places);
     for (const auto& [name, value] : result.metrics) {
       if (name == "check_height_mm") return value;
     }
