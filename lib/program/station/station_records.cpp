@@ -6,95 +6,26 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <cmath>
 #include <filesystem>
-#include <map>
 #include <optional>
-#include <sstream>
 #include <utility>
 
 #include "captures/printable.h"
 #include "program/app.h"
 #include "program/progress.h"
+#include "program/station/known_runs.h"
 #include "rig/input_error.h"
 #include "station/records/archive_runs.h"
 #include "station/records/certificate.h"
 #include "station/records/publish_run.h"
 #include "station/records/retention.h"
 #include "station/records/run_record.h"
-#include "station/records/spool.h"
 #include "station/records/void_run.h"
-#include "station/statistics/control_chart.h"
 #include "station/statistics/run_metrics.h"
 #include "station/unit/station_screen.h"
 
 namespace vlp {
 namespace {
-
-constexpr const char* kAny = "any";
-
-/// Prints a line to stdout. Escapes control characters, so that names in records can neither add a
-/// line nor control the terminal.
-void print_line(const std::string& text) { fmt::print("{}\n", escape_for_line(text)); }
-
-/// Runs of a station, or of records alone.
-struct KnownRuns {
-  std::optional<StationConfig> station;
-  Spool runs;
-
-  /// Returns the station; null for records alone.
-  const StationConfig* station_config() const { return station ? &*station : nullptr; }
-};
-
-/// Opens the runs of a station, of which it first delivers those that wait, or of records alone.
-/// Reports the state of the spool. If the records are unavailable, commands that continue with
-/// waiting runs report it (warn_if_offline()).
-KnownRuns open_runs(const StationRecordsOptions& options) {
-  if (options.station.empty() == options.records.empty()) {
-    throw std::invalid_argument("the records are not specified; give --station or --records");
-  }
-  std::optional<StationConfig> station;
-  if (!options.station.empty()) station = read_station_config(options.station);
-  KnownRuns known{station,
-                  station ? Spool(station->spool, station->records) : Spool({}, options.records)};
-  known.runs.deliver_waiting();
-  try {
-    if (known.runs.list_waiting_runs().empty()) known.runs.records_or_throw();
-  } catch (const RecordsUnavailable& error) {
-    if (error.details != error.what()) spdlog::debug("{}", escape_for_terminal(error.details));
-    throw;
-  }
-  const std::string state = known.runs.describe_state();
-  if (!state.empty()) {
-    const bool is_online = known.runs.offline_reason().empty();
-    spdlog::log(is_online ? spdlog::level::warn : spdlog::level::debug, "{}",
-                escape_for_terminal(state));
-  }
-  return known;
-}
-
-/// Reports that a command used the waiting runs because the records are unavailable.
-void warn_if_offline(KnownRuns& known) {
-  if (known.runs.offline_reason().empty()) return;
-  spdlog::warn("{}", escape_for_terminal(known.runs.make_operator_notice()));
-}
-
-/// Returns the filter with "any" replaced by no condition.
-RunFilter remove_conditions_any(RunFilter filter) {
-  for (std::string* text : {&filter.station, &filter.verdict, &filter.kind}) {
-    if (*text == kAny) text->clear();
-  }
-  return filter;
-}
-
-/// Returns the filter of the options: runs of --station, unless --of-station is given.
-RunFilter filter_by_options(const StationRecordsOptions& options, const KnownRuns& known) {
-  RunFilter filter = options.filter;
-  if (filter.station.empty() && known.station_config() != nullptr) {
-    filter.station = known.station_config()->station;
-  }
-  return remove_conditions_any(std::move(filter));
-}
 
 /// Returns the named run, or the last that the filter accepts.
 RunRecord load_selected_run(KnownRuns& known, const StationRecordsOptions& options) {
@@ -109,119 +40,11 @@ RunRecord load_selected_run(KnownRuns& known, const StationRecordsOptions& optio
   return run;
 }
 
-/// Returns filter_by_options() restricted to units, unless --kind is given.
-RunFilter filter_comparable(const StationRecordsOptions& options, const KnownRuns& known) {
-  RunFilter filter = filter_by_options(options, known);
-  if (options.filter.kind.empty()) filter.kind = "unit";
-  return filter;
-}
-
-/// Checks that all points are from one station, if neither options nor filter name a station.
-void check_one_station(const std::vector<TrendPoint>& points,
-                       const StationRecordsOptions& options) {
-  if (options.station.empty() && options.filter.station.empty()) check_one_station(points);
-}
-
-/// Checks that --output is not an input of the command: the records, station.yaml, or a file named
-/// in it.
-void check_output_option(const StationRecordsOptions& options, const KnownRuns& known) {
-  if (options.output.empty()) return;
-  std::vector<std::string> inputs{options.station, options.records};
-  if (const StationConfig* station = known.station_config()) {
-    inputs.push_back(station->records);
-    for (const auto& file : station->inputs) inputs.push_back(file.string());
-  }
-  check_output_is_no_input(options.output, inputs);
-}
-
 /// Returns the folder for the files of a run.
 std::filesystem::path require_results_folder(const StationRecordsOptions& options) {
   if (!options.output.empty()) return options.output;
   if (!options.station.empty()) return read_station_config(options.station).results;
   throw std::invalid_argument("the output folder is not specified; give --station or --output");
-}
-
-/// Returns the result of a study. Converts std::invalid_argument to Undetermined.
-template <typename Study>
-auto run_study(const Study& study) {
-  try {
-    return study();
-  } catch (const std::invalid_argument& error) {
-    throw Undetermined(error.what());
-  }
-}
-
-/// Parses reference values UNIT=VALUE. Returns them by unit.
-std::map<std::string, double> parse_references(const std::vector<std::string>& texts) {
-  std::map<std::string, double> references;
-  for (const std::string& text : texts) {
-    const auto at = text.rfind('=');
-    std::istringstream number(at == std::string::npos ? "" : text.substr(at + 1));
-    double value = 0;
-    if (at == 0 || !(number >> value) || !number.eof() || !std::isfinite(value)) {
-      throw std::invalid_argument("--reference: should be UNIT=VALUE, not " + text);
-    }
-    if (!references.emplace(text.substr(0, at), value).second) {
-      throw std::invalid_argument("--reference: " + text.substr(0, at) + " occurs twice");
-    }
-  }
-  return references;
-}
-
-std::string format_estimate_test(const EstimateTest& estimate) {
-  return fmt::format("{:>12.4g}{:>12.3g}{:>9.2f}{:>9.4f}   {:.4g} to {:.4g}{}", estimate.value,
-                     estimate.standard_error, estimate.t, estimate.p, estimate.low, estimate.high,
-                     estimate.is_significant() ? "   shows" : "");
-}
-
-/// Prints bias and linearity of a station against reference units.
-void print_bias(const MetricKind& kind, const StationRecordsOptions& options) {
-  const auto references = parse_references(options.references);
-  KnownRuns known = open_runs(options);
-  check_output_option(options, known);
-  const auto points = load_metric_values(known.runs.records_or_throw(), options.metric,
-                                         filter_comparable(options, known));
-  check_one_station(points, options);
-  const auto values = select_reference_values(points, references);
-  std::vector<std::string> units;
-  units.reserve(references.size());
-  for (const auto& [unit, reference] : references) units.push_back(unit);
-  const BiasStudy study = run_study([&] {
-    check_no_shared_images(known.runs.records_or_throw(), points,
-                           select_study_values(points, units));
-    return analyze_bias(values);
-  });
-  constexpr const char* head = "{:<20}{:>10}{:>6}{:>12}{:>12}{:>9}{:>9}   {}";
-  print_line(fmt::format("{}: bias against {} reference units, {}", options.metric,
-                         study.units.size(),
-                         std::string_view(kind.unit).empty() ? "a fraction" : kind.unit));
-  fmt::print("\n");
-  print_line(
-      fmt::format(head, "unit", "reference", "runs", "bias", "se", "t", "p", "95 % interval"));
-  for (const UnitBias& unit : study.units) {
-    print_line(fmt::format("{:<20}{:>10.4g}{:>6}{}", unit.unit, unit.reference, unit.count,
-                           format_estimate_test(unit.bias)));
-  }
-  const auto line = [](const char* name, const EstimateTest& estimate) {
-    fmt::print("{:<36}{}\n", name, format_estimate_test(estimate));
-  };
-  line("all", study.overall_bias);
-  if (study.linearity) {
-    const Linearity& linearity = *study.linearity;
-    fmt::print("\nbias = intercept + slope x reference\n");
-    line("slope", linearity.slope);
-    line("intercept", linearity.intercept);
-    fmt::print("residual sd {:.4g}, R^2 {:.1f} %\n\n{:<20}{:>10}{:>18}   95 % band\n",
-               linearity.residual_sd, 100 * linearity.r_squared, "", "reference", "line");
-    for (const UnitBias& unit : study.units) {
-      const double at = linearity.predict_bias_at(unit.reference),
-                   half = linearity.half_width_at(unit.reference);
-      print_line(fmt::format("{:<20}{:>10.4g}{:>18.4g}   {:.4g} to {:.4g}{}", unit.unit,
-                             unit.reference, at, at - half, at + half,
-                             std::abs(at) > half ? "   without 0" : ""));
-    }
-  }
-  if (!options.output.empty()) write_bias_plot(options.output, options.metric, values, study);
 }
 
 /// Returns true if the filter keeps all runs of a camera, so that its first one is known.
@@ -437,132 +260,6 @@ void import_archive(const StationRecordsOptions& options) {
   throw std::invalid_argument(fmt::format(
       "{} sessions, the first {}, have another result than these records; use new records",
       other.size(), other.front()));
-}
-
-void print_metric_trend(const StationRecordsOptions& options) {
-  const MetricKind kind = require_run_metric_kind(options.metric);
-  KnownRuns known = open_runs(options);
-  check_output_option(options, known);
-  Records& records = known.runs.records_or_throw();
-  RunFilter filter = filter_comparable(options, known);
-  if (options.filter.verdict.empty()) filter.verdict = verdict_name(Verdict::pass);
-  const auto points = records.load_metric_trend(options.metric, filter);
-  check_one_station(points, options);
-  constexpr std::size_t min_points = 2;
-  if (points.size() < min_points) {
-    throw Undetermined(
-        fmt::format("{} of the runs have {}: a trend needs two", points.size(), options.metric));
-  }
-  const std::vector<double> values = extract_trend_values(points);
-  const auto alarms = list_chart_alarms(values, options.rules);
-  const ControlChart chart = make_control_chart(values);
-  const auto gate = find_gate_limit(options.metric, known.station_config(), records, points);
-  if (!options.output.empty())
-    write_trend_plot(options.output, options.metric, points, alarms, gate);
-  print_line(fmt::format("{} of {} runs, {} to {}", options.metric, points.size(),
-                         points.front().ended_utc, points.back().ended_utc));
-  fmt::print("mean      {:.4g} {}\nlimits    {:.4g} to {:.4g}\n", chart.mean, kind.unit,
-             chart.lower, chart.upper);
-  if (gate) fmt::print("gate      {} {:.4g}\n", describe_direction(kind.direction), *gate);
-  for (const ChartAlarm& alarm : alarms) {
-    const TrendPoint& point = points[alarm.index];
-    print_line(fmt::format("{} {} {} {:.4g}  {}: {}", point.ended_utc, point.run, point.camera,
-                           point.value, alarm.rule, alarm.description));
-  }
-  if (alarms.empty()) return;
-  throw GateNotMet(fmt::format("{}: {} alarms, the last {} at {}", options.metric, alarms.size(),
-                               alarms.back().rule, points[alarms.back().index].run));
-}
-
-void print_capability(const StationRecordsOptions& options) {
-  std::vector<MetricKind> kinds = list_run_metrics();
-  if (!options.metric.empty()) kinds = {require_run_metric_kind(options.metric)};
-  KnownRuns known = open_runs(options);
-  Records& records = known.runs.records_or_throw();
-  const RunFilter filter = filter_comparable(options, known);
-  constexpr const char* head = "{:<27}{:>5}{:>10}{:>10}{:>10}{:>10}   {:<25}{}";
-  std::vector<std::string> rows;
-  rows.reserve(kinds.size());
-  for (const MetricKind& kind : kinds) {
-    const auto points = load_metric_values(records, kind.name, filter);
-    check_one_station(points, options);
-    const auto gate = find_gate_limit(kind.name, known.station_config(), records, points);
-    const auto found =
-        compute_capability(extract_trend_values(points), make_specification_limits(kind, gate));
-    if (!found) continue;
-    const auto index = [](const CapabilityIndex& of) {
-      return fmt::format("{:.2f} ({:.2f} to {:.2f})", of.value, of.low, of.high);
-    };
-    rows.push_back(fmt::format(
-        head, kind.name, found->count, fmt::format("{:.4g}", found->mean),
-        fmt::format("{:.3g}", found->within_sd), fmt::format("{:.3g}", found->overall_sd),
-        fmt::format("{} {:.4g}",
-                    kind.direction == Direction::at_least ? ">=" : "<=", gate.value_or(0)),
-        index(found->cpk), index(found->ppk)));
-  }
-  if (rows.empty()) {
-    throw Undetermined("no metric with a gate has two different values in judged runs");
-  }
-  print_line(fmt::format(head, "metric", "runs", "mean", "sd within", "overall", "gate",
-                         "Cpk (95 %)", "Ppk (95 %)"));
-  for (const std::string& row : rows) print_line(row);
-}
-
-void print_gauge_study(const StationRecordsOptions& options) {
-  const MetricKind kind = require_run_metric_kind(options.metric);
-  if (!options.references.empty()) return print_bias(kind, options);
-  KnownRuns known = open_runs(options);
-  Records& records = known.runs.records_or_throw();
-  RunFilter filter = options.filter;
-  if (filter.kind.empty()) filter.kind = "unit";
-  const auto points = load_metric_values(records, options.metric, remove_conditions_any(filter));
-  const auto values = select_study_values(points, options.units);
-  const MeasurementStudy study = run_study([&] {
-    check_no_shared_images(records, points, values);
-    return analyze_study(values);
-  });
-  const auto gate = find_gate_limit(options.metric, known.station_config(), records, points);
-  print_line(fmt::format("{}: {} units, {} stations, {} runs each, mean {:.4g} {}", options.metric,
-                         study.units, study.stations, study.repeats, study.mean, kind.unit));
-  fmt::print("\n");
-  fmt::print("{:<18}{:>5}{:>14}{:>14}\n", "", "dof", "squares", "mean square");
-  for (const auto& [name, line] :
-       {std::pair("units", study.unit), std::pair("stations", study.station),
-        std::pair("units x stations", study.interaction), std::pair("error", study.error)}) {
-    fmt::print("{:<18}{:>5}{:>14.5g}{:>14.5g}\n", name, line.dof, line.sum_of_squares,
-               line.mean_square());
-  }
-  if (study.interaction_p) {
-    fmt::print("units x stations by chance with p = {:.3f}: {}\n", *study.interaction_p,
-               study.pooled ? "pooled with the error" : "significant");
-  }
-  fmt::print("\n{:<34}{:>12}{:>14}\n", "", "sd", "% of total");
-  const auto part = [&](const char* name, double sd) {
-    constexpr double percent = 100;
-    fmt::print("{:<34}{:>12.5g}{:>14.1f}\n", name, sd,
-               study.total > 0 ? percent * sd / study.total : 0);
-  };
-  part("repeatability (EV)", study.repeatability);
-  if (study.stations > 1) {
-    part("stations (AV)", study.station_sd);
-    part("units x stations (INT)", study.interaction_sd);
-  }
-  part("measurement, total (GRR)", study.grr);
-  part("units (PV)", study.unit_sd);
-  part("total (TV)", study.total);
-  if (const auto categories = study.count_distinct_categories()) {
-    fmt::print("distinct categories (ndc){:>21}\n", *categories);
-  }
-  if (const auto percent_of_tolerance =
-          study.precision_to_tolerance_percent(make_specification_limits(kind, gate))) {
-    fmt::print("measurement / tolerance (P/T){:>17.1f} %\n", *percent_of_tolerance);
-  } else if (gate) {
-    fmt::print("no P/T: the mean is not within the gate, {} {:.4g}\n",
-               describe_direction(kind.direction), *gate);
-  }
-  if (study.stations == 1) {
-    fmt::print("\nOne station: differences between stations are unknown.\n");
-  }
 }
 
 }  // namespace vlp

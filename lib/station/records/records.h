@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "rig/input_error.h"
 #include "station/records/audit_trail.h"
+#include "station/records/record_errors.h"
 #include "station/records/run_record.h"
 
 namespace vlp {
@@ -60,18 +60,7 @@ std::vector<Row> keep_last_rows(std::vector<Row> rows, int last) {
   return rows;
 }
 
-/// Error if records do not respond, refuse the connection or its user, or are locked. A later
-/// attempt can succeed.
-class RecordsOffline : public InputError {
- public:
-  using InputError::InputError;
-};
-/// Error if records respond but refuse access: the setting `records` or the server has to be
-/// corrected.
-class RecordsRefused : public RecordsOffline {
- public:
-  using RecordsOffline::RecordsOffline;
-};
+class RecordDatabase;
 
 /// Records of one or more stations in a database: an SQLite file, or PostgreSQL by a connection
 /// string postgresql://...
@@ -116,8 +105,7 @@ class Records {
   TrailCheck check_trail(const std::string& expected_digest);
 
  private:
-  struct Database;
-  std::unique_ptr<Database> database_;
+  std::unique_ptr<RecordDatabase> database_;
 };
 
 }  // namespace vlp
