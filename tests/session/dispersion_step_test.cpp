@@ -156,22 +156,6 @@ TEST(RunDispersionStep, FailsForCapturesFarFromPosition) {
   EXPECT_FALSE(result.calibration.dispersion);
 }
 
-TEST(RunDispersionStep, NamesCapturesThatDoNotFitOthers) {
-  const SyntheticRig rig = make_rig_with_tilted_camera();
-  KnownPositions known = take_captures_at_origin(rig, {0, 0});
-  for (std::size_t i = 0; i < known.captures.size(); ++i)
-    known.captures[i].image = std::to_string(i) + ".png";
-  EXPECT_EQ(run_step(rig, known).inconsistent_captures, "");
-  for (const std::size_t other_camera : {2U, 6U}) {
-    ASSERT_GT(known.captures[other_camera].detections.size(), 2U);
-    known.captures[other_camera].detections[0].pixel.x() += 2;
-  }
-  const DispersionResult result = run_step(rig, known);
-  ASSERT_TRUE(result.has_succeeded()) << result.message;
-  EXPECT_THAT(result.inconsistent_captures, HasSubstr("captures 2.png, 6.png do not fit"));
-  EXPECT_THAT(result.warnings, Contains(result.inconsistent_captures));
-}
-
 TEST(CheckKnownPositions, FailsIfFewerThanRequiredAreKnown) {
   EXPECT_THAT(check_known_positions(35, 36, 36).message, HasSubstr("1 of the 36 captures"));
   EXPECT_TRUE(check_known_positions(35, 36, 35).has_succeeded());

@@ -92,21 +92,6 @@ TEST(RunRotationStep, WarnsIfResidualsExceedThreeTimesStatedNoise) {
   EXPECT_THAT(camera.calibrate().warnings, Not(Contains(kNoiseWarning))) << "noise is unknown";
 }
 
-TEST(RunRotationStep, NamesCapturesThatDoNotFitOthers) {
-  RotatingCamera camera;
-  for (const double height_m : {0.0, 0.4}) camera.rotate(height_m, 8);
-  auto& frames = camera.captures.frames;
-  for (const std::size_t other_camera : {3U, 4U}) {
-    ASSERT_GT(frames[other_camera].detections.size(), 2U);
-    frames[other_camera].detections[0].pixel.x() += 2;
-  }
-  const RotationResult result = camera.calibrate();
-  ASSERT_TRUE(result.has_succeeded()) << result.message;
-  EXPECT_THAT(result.inconsistent_captures,
-              HasSubstr("in captures " + frames[3].image + ", " + frames[4].image + " do not fit"));
-  EXPECT_THAT(result.warnings, Contains(result.inconsistent_captures));
-}
-
 TEST(RunRotationStep, WarnsThatLeverArmIsNotEstimatedFromOneHeight) {
   RotatingCamera camera;
   camera.survey.lever_arm_m.setZero();
