@@ -11,7 +11,12 @@ namespace {
 
 template <int N>
 SymmetricEigen<N> decompose(const Eigen::Matrix<double, N, N>& matrix) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> solver(matrix);
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, N, N>> solver;
+  if constexpr (N == 2) {
+    solver.computeDirect(matrix);
+  } else {
+    solver.compute(matrix);
+  }
   if (solver.info() == Eigen::Success) return {solver.eigenvalues(), solver.eigenvectors()};
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   return {Eigen::Matrix<double, N, 1>::Constant(matrix.rows(), nan),
