@@ -152,7 +152,7 @@ void add_options(CLI::App& app, Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Estimates tilt and lever arm of a camera, lamp positions and lens jointly from sets of "
       "captures, with their joint covariance. A set may be a rotation in place, a drive, or "
       "captures at known positions or several heights. The lens is corrected within the covariance "
@@ -173,6 +173,7 @@ int main(int argc, char** argv) {
       "    --calibration datasets/example/calibration.yaml -o adjusted.yaml \\\n"
       "    --refine-map refined.yaml\n",
       "vlp-adjust");
+  CLI::App& app = *parser;
   vlp::Options options;
   vlp::add_options(app, options);
   return vlp::parse_and_run(app, argc, argv, [&] {

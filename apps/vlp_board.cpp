@@ -158,7 +158,7 @@ void add_options(CLI::App& app, Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Creates a printable calibration board of AprilTags, squares (chessboard) or both (ChArUco, "
       "with markers of an OpenCV dictionary). Also writes its description, board.yaml, for "
       "vlp-intrinsics. Print the board at 100 %, measure the ruler on the print, and mount it on a "
@@ -167,6 +167,7 @@ int main(int argc, char** argv) {
       "  build/bin/vlp-board -o board.pdf\n"
       "  build/bin/vlp-board --kalibr --cols 6 --rows 6 --paper A3 -o board.pdf\n",
       "vlp-board");
+  CLI::App& app = *parser;
   vlp::Options options;
   vlp::add_options(app, options);
   return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(options); });

@@ -51,7 +51,7 @@ void run(Options options) {
 }
 
 int calibrate(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = make_app(
       "Calibrates a camera from a folder of its captures, evaluates it, and writes a report. Runs "
       "the steps lens, row-time, rotation, dispersion, check, one per line-*, and evaluate. Skips "
       "a step if its inputs, options and outputs are unchanged. After an interruption the same "
@@ -75,6 +75,7 @@ int calibrate(int argc, char** argv) {
       "  build/bin/vlp-calibrate out/session --row-time-s 3e-5 --readout rows \\\n"
       "    -o out/results\n",
       kName);
+  CLI::App& app = *parser;
   Options options;
   auto& how = options.how;
   how.frontend = make_intake_options();
@@ -120,7 +121,8 @@ int calibrate(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   if (argc != 2 || std::string_view(argv[1]) != "--batch-stdin") return vlp::calibrate(argc, argv);
-  CLI::App app("", vlp::kName);
+  const auto parser = vlp::make_app("", vlp::kName);
+  CLI::App& app = *parser;
   return vlp::parse_and_run(app, 1, argv, [] {
     vlp::load_tag_family("tag36h11");  // family of most boards
     vlp::run_each_line(vlp::kName, vlp::calibrate);

@@ -144,7 +144,7 @@ void run(const CLI::App& app, const Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Converts a camera file between the formats of this toolbox (calibration), mrcal "
       "(.cameramodel), OpenCV (FileStorage, also of cv::fisheye), ROS (camera_info) and Kalibr "
       "(camchain). The format of the input is detected from its content. Parameters stay unchanged "
@@ -157,6 +157,7 @@ int main(int argc, char** argv) {
       "  build/bin/vlp-convert datasets/paper-rig/rendered/true_calibration.yaml \\\n"
       "    --to ros -o ros.yaml\n",
       "vlp-convert");
+  CLI::App& app = *parser;
   vlp::Options options;
   app.add_option("input", options.input,
                  "Input file with a camera; or corners of a board (.csv of vlp-intrinsics "

@@ -72,7 +72,7 @@ void run(const CaptureOptions& options, const std::string& captures) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Detects lamps in images of a rolling-shutter camera and identifies them by their stripes. "
       "Writes only lamps that are completely visible and identified without ambiguity.\n\n"
       "Example, from the project's folder:\n"
@@ -81,6 +81,7 @@ int main(int argc, char** argv) {
       "    --calibration datasets/paper-rig/rendered/true_calibration.yaml \\\n"
       "    -o detections.csv\n",
       "vlp-detect");
+  CLI::App& app = *parser;
   vlp::CaptureOptions options;
   app.add_option("images", options.images,
                  "Folder of images: PNG, JPEG, BMP, TIFF or PGM; or a video: AVI, MP4, MOV, MKV or "

@@ -98,7 +98,7 @@ void run(const CLI::App& app, Options options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Estimates the dispersion offset of a camera, the image offset that remains in fixes at "
       "known positions. Captures at several yaws separate it from errors of lamp map and reference "
       "points.\n\n"
@@ -108,6 +108,7 @@ int main(int argc, char** argv) {
       "    --calibration datasets/example/calibration.yaml --reference-point 0.1 0 \\\n"
       "    -o calibration.yaml\n",
       "vlp-dispersion");
+  CLI::App& app = *parser;
   vlp::Options options;
   vlp::add_capture_options(app, options.images,
                            {"Folder of images taken at known positions, or their detections.csv",

@@ -334,7 +334,7 @@ void add_options(CLI::App& app, Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Evaluates fixes against ground truth, a path or a commanded line, and checks gates. Exit "
       "code 1 if a gate fails.\n\n"
       "Example, from the project's folder:\n"
@@ -347,6 +347,7 @@ int main(int argc, char** argv) {
       "    --calibration datasets/example/calibration.yaml \\\n"
       "    --lamps datasets/example/lamps.yaml --report report.html\n",
       vlp::kName);
+  CLI::App& app = *parser;
   vlp::Options options;
   vlp::add_options(app, options);
   app.footer("Gates:\n" + vlp::describe_metrics(vlp::list_all_metric_kinds()));

@@ -329,7 +329,7 @@ void add_output_options(CLI::App& app, Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Calibrates the lens of a camera from images of a board: AprilTags (see vlp-board), Kalibr "
       "AprilGrid, ChArUco or chessboard. Reports the uncertainty of the result. Exit code 1 if a "
       "gate fails.\n\n"
@@ -338,6 +338,7 @@ int main(int argc, char** argv) {
       "  build/bin/vlp-intrinsics out/rig/boards/*.png --board out/rig/board.yaml \\\n"
       "    --row-time-s 3e-5 --readout rows -o camera.yaml\n",
       "vlp-intrinsics");
+  CLI::App& app = *parser;
   vlp::Options options;
   vlp::add_input_options(app, options);
   vlp::add_solve_options(app, options);

@@ -197,7 +197,7 @@ void add_options(CLI::App& app, Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Computes the theoretical limit of positioning (CRLB) over a floor, and the error budget. "
       "The budget has the contributions of pixel noise, principal point, tilt and lamp map. With "
       "--from-calibration, the contributions follow from the uncertainties reported by calibration "
@@ -207,6 +207,7 @@ int main(int argc, char** argv) {
       "    --calibration datasets/example/calibration.yaml --height-m 0 \\\n"
       "    --noise-px 0.05 --tilt-deg 0.01 --lamp-map-mm 0.1 --picture limits.png\n",
       "vlp-limits");
+  CLI::App& app = *parser;
   vlp::Options options;
   vlp::add_options(app, options);
   return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(options); });

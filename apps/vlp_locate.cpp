@@ -222,7 +222,7 @@ void add_options(CLI::App& app, Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Estimates camera positions from the lamps in images. Reads detections.csv or a folder of "
       "images, and writes fixes.csv.\n\n"
       "Example, from the project's folder:\n"
@@ -230,6 +230,7 @@ int main(int argc, char** argv) {
       "    --lamps datasets/example/lamps.yaml \\\n"
       "    --calibration datasets/example/calibration.yaml -o fixes.csv\n",
       "vlp-locate");
+  CLI::App& app = *parser;
   vlp::Options options;
   vlp::add_options(app, options);
   return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(options); });

@@ -38,7 +38,7 @@ void run(const CLI::App& app, const Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Estimates the rotation center of a camera, and from it the tilt, from captures while it "
       "rotates in place about a vertical axis. Needs at least three captures over 90 degrees, "
       "better twelve over a full turn. The angles may be unknown. With camera and lamps at one "
@@ -50,6 +50,7 @@ int main(int argc, char** argv) {
       "    --calibration datasets/example/calibration.yaml -o rotated.yaml \\\n"
       "    --plot rotation.png\n",
       "vlp-rotation");
+  CLI::App& app = *parser;
   vlp::Options options;
   vlp::add_capture_options(
       app, options.images,

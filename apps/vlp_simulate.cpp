@@ -60,13 +60,14 @@ void run(const Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Renders images of modulated lamps and calibration boards as a rolling-shutter camera "
       "records them, with ground truth. An interrupted run continues.\n\n"
       "Example, from the project's folder:\n"
       "  build/bin/vlp-simulate datasets/paper-rig/scene.yaml --only sample \\\n"
       "    -o out/rig\n",
       "vlp-simulate");
+  CLI::App& app = *parser;
   vlp::Options options;
   app.add_option("scene", options.scene, "Scene file, .yaml")->required();
   app.add_option("-o,--output", options.output, "Output folder of the captures")->required();

@@ -256,7 +256,7 @@ void run_command(const CLI::App& app, const StationRunOptions& run,
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Calibrates cameras at a station of a factory, gives verdicts and keeps records. 'run' "
       "processes the images of boards, rotation, dispersion and check as they arrive, or from "
       "complete folders (--batch). The verdict is PASS, FAIL (exit code 1, camera fault) or "
@@ -270,6 +270,7 @@ int main(int argc, char** argv) {
       "    --camera-id 0001 --batch out/station/unit\n"
       "  build/bin/vlp-station list --station out/station/station.yaml\n",
       "vlp-station");
+  CLI::App& app = *parser;
   app.require_subcommand(1);
   app.fallthrough();
   vlp::StationRunOptions run;

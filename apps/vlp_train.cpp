@@ -107,7 +107,7 @@ void train_row_time(const CLI::App& app, const Options& options) {
 }  // namespace vlp
 
 int main(int argc, char** argv) {
-  CLI::App app(
+  const auto parser = vlp::make_app(
       "Trains a lamp classifier from images with a table of their lamps. With --row-time, "
       "estimates the row time of a camera from images of lamps with known frequencies.\n\n"
       "Example, from the project's folder:\n"
@@ -116,6 +116,7 @@ int main(int argc, char** argv) {
       "    --calibration datasets/paper-rig/rendered/true_calibration.yaml \\\n"
       "    -o calibration.yaml\n",
       "vlp-train");
+  CLI::App& app = *parser;
   vlp::Options options;
   app.add_option("folders", options.folders,
                  "Folders of images: PNG, JPEG, BMP, TIFF or PGM. More positions and distances "

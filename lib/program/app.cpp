@@ -127,6 +127,10 @@ bool are_same_file(const std::string& one, const std::string& other) {
 
 }  // namespace
 
+std::unique_ptr<CLI::App> make_app(const std::string& description, const std::string& name) {
+  return std::make_unique<CLI::App>(description, name);
+}
+
 int count_cpu_cores() {
   return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }

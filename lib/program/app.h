@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <initializer_list>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -34,6 +35,10 @@ class GateNotMet : public std::runtime_error {
 
 /// Returns the default number of threads: the number of cores, at least 1.
 int count_cpu_cores();
+
+/// Returns the parser of a program's arguments. What CLI11 defines for it is compiled here, not in
+/// each program.
+std::unique_ptr<CLI::App> make_app(const std::string& description, const std::string& name);
 
 /// Return validators of options that accept finite numbers: any, positive, or not negative.
 CLI::Validator make_finite_validator();
