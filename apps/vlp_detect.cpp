@@ -36,7 +36,7 @@ void run(const CaptureOptions& options, const std::string& captures) {
   check_outputs_distinct(
       {{"--output", options.output}, {"--lights", options.lights}, {"--captures", captures}},
       inputs);
-  check_frame_step(options.frontend.every, {options.images});
+  check_every_option(options.frontend.every, {options.images});
   if (!captures.empty() && !is_video_file_name(options.images)) {
     throw std::invalid_argument("--captures: images have no frame times; use it for a video only");
   }
@@ -102,7 +102,7 @@ int main(int argc, char** argv) {
                  "Output file of all lights, CSV, with class, reason and measured values");
   std::string captures;
   app.add_option("--captures", captures, "Output file of the frame times of a video, captures.csv");
-  vlp::add_frame_step(app, options.frontend.every);
+  vlp::add_every_option(app, options.frontend.every);
   vlp::add_lamp_options(app, options);
   return vlp::parse_and_run(app, argc, argv, [&] { vlp::run(options, captures); });
 }

@@ -208,7 +208,7 @@ void run(const CLI::App& app, const Options& options) {
   const std::vector<Gate> gates = parse_gates(options);
   if (!chooses_lens(options)) check_exports(options, known_camera(options));
   const std::string corners = corner_file(app, options);
-  check_frame_step(options.frontend.every, options.images);
+  check_every_option(options.frontend.every, options.images);
   const auto images = corners.empty() ? expand_folders(options.images)
                                       : std::vector<std::filesystem::path>{options.images.front()};
   std::vector<std::string> inputs{options.board};
@@ -243,7 +243,7 @@ void run(const CLI::App& app, const Options& options) {
   require_success(result);
   check_exports(options, result.calibration.camera);  // the selected lens model
   write_results(options, result);
-  if (lens.choice) fmt::print("lens model    {}\n", describe_choice(*lens.choice));
+  if (lens.choice) fmt::print("lens model    {}\n", describe_lens_choice(*lens.choice));
   print_lens(lens.solution, lens.report, lens.coverage, lens.held_out);
   print_uncertainty(lens);
   require_gates_passed(gates, result);
@@ -319,7 +319,7 @@ void add_output_options(CLI::App& app, Options& options) {
       ->check(make_plot_file_validator());
   app.add_option("--cache", options.frontend.corner_cache,
                  "Folder for the detected corners of each image, which later runs reuse");
-  add_frame_step(app, options.frontend.every);
+  add_every_option(app, options.frontend.every);
   add_max_mpx_option(app, options.frontend.max_mpx);
   add_quality_options(app, options.frontend);
   add_threads_option(app, options.frontend.threads);

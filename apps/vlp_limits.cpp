@@ -82,10 +82,10 @@ BodyPrior make_body_prior(const Options& options, const Camera& camera) {
   BodyPrior prior;
   if (const auto motion = options.motion.make_motion_prior()) {
     check_timing_known(camera);
-    prior.set_sd(kBodyVelocity, motion->velocity_sd_m_per_s);
-    prior.set_sd(kBodyYawRate, motion->yaw_rate_sd_rad_per_s);
+    prior.set_state_sd(kBodyVelocity, motion->velocity_sd_m_per_s);
+    prior.set_state_sd(kBodyYawRate, motion->yaw_rate_sd_rad_per_s);
   }
-  prior.set_sd(kBodyRoll, rad_from_deg(options.roll_pitch_sd_deg));
+  prior.set_state_sd(kBodyRoll, rad_from_deg(options.roll_pitch_sd_deg));
   return prior;
 }
 

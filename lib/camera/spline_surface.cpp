@@ -55,15 +55,15 @@ SplineSurface::SplineSurface(const SplineGrid& grid, std::span<const double> con
   pieces_per_u_ = (grid.nx - grid.order) / (2 * edge);
   reach_ = {edge, (grid.ny - grid.order) / (2 * pieces_per_u_)};
   if (grid.order == 2) {
-    fill_pieces<2>(control_points);
+    compute_spline_pieces<2>(control_points);
   } else {
-    fill_pieces<3>(control_points);
+    compute_spline_pieces<3>(control_points);
   }
-  fill_guesses();
+  compute_initial_guesses();
 }
 
 template <int Order>
-void SplineSurface::fill_pieces(std::span<const double> control_points) {
+void SplineSurface::compute_spline_pieces(std::span<const double> control_points) {
   constexpr int width = Order + 1;
   const Eigen::Matrix<double, width, width> by_power = compute_spline_basis<Order>().transpose();
   Eigen::Matrix<double, width, width> x, y;
@@ -140,7 +140,7 @@ SplineSurface::Weights SplineSurface::look_up_weights(const Eigen::Vector2d& u) 
 }
 
 template <int Order>
-std::optional<Eigen::Vector2d> SplineSurface::search_undistorted(
+std::optional<Eigen::Vector2d> SplineSurface::search_undistorted_point(
     Eigen::Vector2d u, const Eigen::Vector2d& distorted, Eigen::Matrix2d& d_distorted_d_u) const {
   constexpr int max_iterations = 50, max_halvings = 12;
   constexpr double numeric_tolerance = 1e-12;  // relative to the reach, for pixels at its very end
@@ -179,12 +179,12 @@ std::optional<Eigen::Vector2d> SplineSurface::search_undistorted(
 
 std::optional<Eigen::Vector2d> SplineSurface::undistort_point(
     const Eigen::Vector2d& distorted, Eigen::Matrix2d& d_distorted_d_u) const {
-  const Eigen::Vector2d start = guess_undistorted(distorted);
-  return grid_.order == 2 ? search_undistorted<2>(start, distorted, d_distorted_d_u)
-                          : search_undistorted<3>(start, distorted, d_distorted_d_u);
+  const Eigen::Vector2d start = guess_undistorted_point(distorted);
+  return grid_.order == 2 ? search_undistorted_point<2>(start, distorted, d_distorted_d_u)
+                          : search_undistorted_point<3>(start, distorted, d_distorted_d_u);
 }
 
-Eigen::Vector2d SplineSurface::guess_undistorted(const Eigen::Vector2d& distorted) const {
+Eigen::Vector2d SplineSurface::guess_undistorted_point(const Eigen::Vector2d& distorted) const {
   const Eigen::Vector2d at = (distorted - first_node_).cwiseProduct(nodes_per_unit_);
   const auto clamp_node = [](double node) { return node > 0 ? std::min(node, kNodes - 1.0) : 0; };
   const double column = clamp_node(at.x()), row = clamp_node(at.y());
@@ -197,7 +197,7 @@ Eigen::Vector2d SplineSurface::guess_undistorted(const Eigen::Vector2d& distorte
                          y * ((1 - x) * node[kNodes] + x * node[kNodes + 1]));
 }
 
-void SplineSurface::fill_guesses() {
+void SplineSurface::compute_initial_guesses() {
   constexpr int num_samples = 2 * kNodes - 1;
   constexpr double inf = std::numeric_limits<double>::infinity();
   std::vector<std::pair<Eigen::Vector2d, Value>> places;

@@ -64,20 +64,20 @@ class SplineSurface {
 
  private:
   template <int Order>
-  void fill_pieces(std::span<const double> control_points);
+  void compute_spline_pieces(std::span<const double> control_points);
   template <int Order>
   Weights compute_weights(const Eigen::Vector2d& u) const;
   template <int Order>
   inline Value evaluate_spline(const Eigen::Vector2d& u) const;
   template <int Order>
-  std::optional<Eigen::Vector2d> search_undistorted(Eigen::Vector2d u,
-                                                    const Eigen::Vector2d& distorted,
-                                                    Eigen::Matrix2d& d_distorted_d_u) const;
+  std::optional<Eigen::Vector2d> search_undistorted_point(Eigen::Vector2d u,
+                                                          const Eigen::Vector2d& distorted,
+                                                          Eigen::Matrix2d& d_distorted_d_u) const;
   Eigen::Vector2d clamp_to_extent(const Eigen::Vector2d& u) const {
     return u.cwiseMax(-reach_).cwiseMin(reach_);
   }
-  void fill_guesses();
-  Eigen::Vector2d guess_undistorted(const Eigen::Vector2d& distorted) const;
+  void compute_initial_guesses();
+  Eigen::Vector2d guess_undistorted_point(const Eigen::Vector2d& distorted) const;
 
   SplineGrid grid_;
   double pieces_per_u_;

@@ -137,7 +137,7 @@ std::vector<Metric> collect_metrics(const Evaluation& evaluation) {
     add_mm("fitted_max_mm", fit->distances_m.max);
   }
   if (const auto& comparison = evaluation.comparison; comparison) {
-    for (std::size_t i = 0; const ComparedQuantity& quantity : list_quantities()) {
+    for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
       const QuantityComparison& compared = comparison->quantities[i++];
       if (compared.pairs > 0) add(quantity.metric, quantity.units_per_si * compared.compute_loss());
     }
@@ -152,7 +152,7 @@ std::vector<Gate> make_comparison_gates(const std::vector<Metric>& metrics) {
   const auto add = [&](const char* metric) {
     if (find_metric_value(metrics, metric)) gates.push_back({metric, 0});
   };
-  for (const ComparedQuantity& quantity : list_quantities()) add(quantity.metric);
+  for (const ComparedQuantity& quantity : list_compared_quantities()) add(quantity.metric);
   add(kUnpairedMetric);
   return gates;
 }

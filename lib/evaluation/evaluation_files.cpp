@@ -116,7 +116,7 @@ Json to_json(const Comparison& comparison) {
             {"only_in_fixes", comparison.only_in_fixes},
             {"only_in_compared", comparison.only_in_other_fixes},
             {"unpaired", comparison.unpaired}};
-  for (std::size_t i = 0; const ComparedQuantity& quantity : list_quantities()) {
+  for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
     const QuantityComparison& compared = comparison.quantities[i++];
     if (i == 1 || compared.pairs > 0) json[quantity.key] = to_json(compared, quantity);
   }

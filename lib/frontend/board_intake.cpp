@@ -366,12 +366,12 @@ Observation BoardIntake::detect_board(const SourceImage& source) const {
   }
   result.blur_px = found->blur_px;
   result.board = std::move(found->view);
-  reject_unusable(result, found->bright_fraction, found->white_fraction);
+  reject_low_quality_image(result, found->bright_fraction, found->white_fraction);
   return result;
 }
 
-void BoardIntake::reject_unusable(Observation& image, double bright_fraction,
-                                  double white_fraction) const {
+void BoardIntake::reject_low_quality_image(Observation& image, double bright_fraction,
+                                           double white_fraction) const {
   const BoardDetection& seen = image.board->detection;
   const bool has_pose = lattice_.can_determine_pose(seen);
   if (white_fraction > options_.max_white_fraction) {
@@ -434,7 +434,7 @@ Observations detect_boards(const std::vector<fs::path>& images, const Board& boa
       progress);
   check_any_readable(images.front().parent_path(), result.images);
   reject_other_sizes(result.images);
-  reject_repeated(result.images, ImageUse::boards, options);
+  reject_repeated_images(result.images, ImageUse::boards, options);
   if (std::none_of(result.images.begin(), result.images.end(), [](const Observation& image) {
         return image.board && image.board->detection.has_corners();
       })) {
@@ -465,7 +465,7 @@ Observations read_board_views(const fs::path& file, const Board& board, const fs
     reject_few_corners(board, lattice, image);
     result.images.push_back(std::move(image));
   }
-  reject_repeated(result.images, ImageUse::boards, options);
+  reject_repeated_images(result.images, ImageUse::boards, options);
   if (!is_seen) {
     result.failure = {true,
                       fmt::format("none of its {} images has a corner of the board; is it of "

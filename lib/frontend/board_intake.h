@@ -35,7 +35,8 @@ class BoardIntake {
 
  private:
   /// Rejects an image that is overexposed, too dark, blurred, or shows too few corners.
-  void reject_unusable(Observation& image, double bright_fraction, double white_fraction) const;
+  void reject_low_quality_image(Observation& image, double bright_fraction,
+                                double white_fraction) const;
   /// Returns the reason why an image with a measured blur is too blurred; empty if it is not.
   std::string describe_blur(const Observation& image) const;
 

@@ -47,7 +47,7 @@ std::optional<SourceImage> ImageSource::read_video_frame() {
   }
   auto frame = video_->read_next_frame();
   if (!frame) {
-    const std::string missing = video_->describe_missing();
+    const std::string missing = video_->describe_missing_frames();
     if (!missing.empty()) warnings_.push_back(file.string() + ": " + missing);
     video_.reset();
     return {};

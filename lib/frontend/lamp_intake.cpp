@@ -270,7 +270,8 @@ LevelRotations read_level_rotations(const LampImages& images) {
     captures = read_folder_captures(images.images);
   const bool below = images.lamps.lamps_below_camera;
   for (auto& [image, capture] : captures) {
-    if (capture.inclination) capture.inclination = turn_over_if(below, *capture.inclination);
+    if (capture.inclination)
+      capture.inclination = rotate_upside_down_if(below, *capture.inclination);
   }
   return compute_level_rotations(captures, *images.calibration,
                                  (below ? -1 : 1) * images.yaw_in_robot_rad);
@@ -339,7 +340,7 @@ Observation LampIntake::detect_lamps_in_image(const SourceImage& source) const {
             return detector.copy_for_tilt(level_from_camera).detect_lights(to_image_view(image));
           });
     }
-    if (std::cmp_less(list_identified(result).size(), min_lamps_for_use(use_)))
+    if (std::cmp_less(list_identified_lamps(result).size(), min_lamps_for_use(use_)))
       reject_few_lamps(image, result);
   });
   if (!options_.annotate.empty() && !pixels.empty()) {
@@ -349,13 +350,13 @@ Observation LampIntake::detect_lamps_in_image(const SourceImage& source) const {
   return result;
 }
 
-Observations LampIntake::detect_in_all(const std::vector<fs::path>& files,
-                                       const IntakeProgress& progress) const {
+Observations LampIntake::detect_lamps_in_images(const std::vector<fs::path>& files,
+                                                const IntakeProgress& progress) const {
   ImageSource source(files, options_, imager_px_);
   Observations result = collect_observations(
       source, options_.threads,
       [&](const SourceImage& image) { return detect_lamps_in_image(image); }, progress);
-  reject_repeated(result.images, use_, options_);
+  reject_repeated_images(result.images, use_, options_);
   const auto turned = std::count_if(
       result.images.begin(), result.images.end(),
       [&](const Observation& image) { return image.readout != detector_.readout_direction(); });
@@ -374,8 +375,8 @@ std::vector<fs::path> list_lamp_images(const fs::path& images) {
 
 Observations detect_lamps(const LampImages& images, ImageUse use, const FrontendOptions& options,
                           const IntakeProgress& progress) {
-  Observations result =
-      LampIntake(images, use, options).detect_in_all(list_lamp_images(images.images), progress);
+  Observations result = LampIntake(images, use, options)
+                            .detect_lamps_in_images(list_lamp_images(images.images), progress);
   check_any_identified(images, result);
   return result;
 }

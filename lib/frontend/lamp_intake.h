@@ -77,7 +77,7 @@ class LampIntake {
              const std::optional<std::array<int, 2>>& imager_px, LevelRotations levels = {});
 
   /// Creates the intake of a set of images: reads the classifier and estimates the readout
-  /// direction if it is not known. detect_in_all() returns its notes and warnings,
+  /// direction if it is not known. detect_lamps_in_images() returns its notes and warnings,
   /// too.
   /// @throws InputError if the row time, the frequencies or images are missing, or if captures.csv
   ///     cannot be read; also if the classifier is for other lamps or another row time
@@ -90,12 +90,14 @@ class LampIntake {
   Observation detect_lamps_in_image(const SourceImage& source) const;
 
   /// Applies `repetition` to the lights of each image.
-  void set_repetition(DetectionRepetition repetition) { repetition_ = std::move(repetition); }
+  void set_detection_repetition(DetectionRepetition repetition) {
+    repetition_ = std::move(repetition);
+  }
 
   /// Applies detect_lamps_in_image() to all images and video frames. Returns one observation per
   /// image, in order.
-  Observations detect_in_all(const std::vector<std::filesystem::path>& files,
-                             const IntakeProgress& progress = {}) const;
+  Observations detect_lamps_in_images(const std::vector<std::filesystem::path>& files,
+                                      const IntakeProgress& progress = {}) const;
 
   Readout readout_direction() const { return detector_.readout_direction(); }
 

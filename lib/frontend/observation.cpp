@@ -67,7 +67,7 @@ void prepend_messages(const Observations& remarks, Observations& result) {
   result.notes.insert(result.notes.begin(), remarks.notes.begin(), remarks.notes.end());
 }
 
-std::vector<Detection> list_identified(const Observation& image) {
+std::vector<Detection> list_identified_lamps(const Observation& image) {
   return select_lamps(image.lights);
 }
 
@@ -82,7 +82,8 @@ std::vector<BoardView> collect_board_views(std::span<const Observation> images) 
 std::vector<Frame> collect_lamp_frames(std::span<const Observation> images) {
   std::vector<Frame> frames;
   for (const Observation& image : images) {
-    if (image.is_image_kept()) frames.push_back({image.image_file_name(), list_identified(image)});
+    if (image.is_image_kept())
+      frames.push_back({image.image_file_name(), list_identified_lamps(image)});
   }
   return frames;
 }
@@ -172,7 +173,7 @@ namespace {
 std::vector<PointDetection> get_points_in(const Observation& image) {
   if (image.board) return collect_detected_corners(image.board->detection);
   std::vector<PointDetection> points;
-  for (const Detection& lamp : list_identified(image)) {
+  for (const Detection& lamp : list_identified_lamps(image)) {
     points.push_back({static_cast<std::size_t>(lamp.lamp), lamp.pixel});
   }
   std::sort(points.begin(), points.end(),
@@ -233,8 +234,8 @@ void Selection::add_kept_image(const Observation& image) {
   if (use_ != ImageUse::fixes) kept_.push_back({image.image_file_name(), get_points_in(image)});
 }
 
-void reject_repeated(std::vector<Observation>& images, ImageUse use,
-                     const FrontendOptions& options) {
+void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
+                            const FrontendOptions& options) {
   Selection selection(use, options);
   for (Observation& image : images) selection.add_or_reject(image);
 }

@@ -106,7 +106,7 @@ void prepend_messages(const Observations& remarks, Observations& result);
 
 /// Returns a detection for each light of kind `lamp`: id, pixel of the center, and its standard
 /// deviation.
-std::vector<Detection> list_identified(const Observation& image);
+std::vector<Detection> list_identified_lamps(const Observation& image);
 
 /// Returns the detections of the board in the images that are used, in their order.
 std::vector<BoardView> collect_board_views(std::span<const Observation> images);
@@ -175,8 +175,8 @@ class Selection {
 };
 
 /// Rejects images that repeat an earlier one, by a Selection, in the order of `images`.
-void reject_repeated(std::vector<Observation>& images, ImageUse use,
-                     const FrontendOptions& options);
+void reject_repeated_images(std::vector<Observation>& images, ImageUse use,
+                            const FrontendOptions& options);
 
 /// Returns the minimum number of lamps that an image needs.
 int min_lamps_for_use(ImageUse use);

@@ -131,7 +131,7 @@ std::optional<VideoFrame> Video::read_next_frame() {
 
 void Video::skip_video_frame() { grab_frame(); }
 
-std::string Video::describe_missing() const {
+std::string Video::describe_missing_frames() const {
   const std::size_t reported = reported_frame_count();
   // Other formats only estimate the number of frames from their duration.
   const std::string kind = std::filesystem::path(source_).extension().string();

@@ -55,7 +55,7 @@ class Video {
   std::size_t reported_frame_count() const;
   /// Describes missing frames in one line without the file name; empty if there are none.
   /// @pre The end of the video has been reached.
-  std::string describe_missing() const;
+  std::string describe_missing_frames() const;
 
  private:
   bool grab_frame();

@@ -406,7 +406,7 @@ LightDetector::OutlineFits LightDetector::fit_outlines(const ImageView& lines,
   OutlineFits fits{std::vector<std::optional<MeasuredLight>>(found.size()), {}};
   for (int pass = 0; pass < num_passes; ++pass) {
     const bool is_last = pass + 1 == num_passes;
-    const auto inverse_height = is_last ? fit_inverse_height(list_radii(found, fits))
+    const auto inverse_height = is_last ? fit_inverse_height(list_disc_radii(found, fits))
                                         : estimate_inverse_height(list_lamps_in_plane(found, fits));
     const bool is_better = inverse_height && (!fits.inverse_height ||
                                               inverse_height->log_sd < fits.inverse_height->log_sd);
@@ -416,7 +416,7 @@ LightDetector::OutlineFits LightDetector::fit_outlines(const ImageView& lines,
       auto& outline = fits.outlines[i];
       const auto radius = predict_radius(find_lamp(found[i]), inverse_height);
       const bool is_disc = outline && outline->outline_kind != LightOutline::rectangle;
-      if (!outline || (is_disc && radius && !radius->agrees_with(*outline))) {
+      if (!outline || (is_disc && radius && !radius->is_radius_of(*outline))) {
         outline = fit_outline(lines, found[i], blobs, background, inverse_height);
       } else if (is_last && is_disc && radius && radius->improves_fit(*outline)) {
         const auto fit = fit_disc_outline(lines, outline->plane_outline, start_blur_px,
@@ -444,8 +444,8 @@ std::vector<LampInPlane> LightDetector::list_lamps_in_plane(
   return lamps;
 }
 
-std::vector<LampRadius> LightDetector::list_radii(const std::vector<ModulatedLight>& found,
-                                                  const OutlineFits& fits) const {
+std::vector<LampRadius> LightDetector::list_disc_radii(const std::vector<ModulatedLight>& found,
+                                                       const OutlineFits& fits) const {
   std::vector<LampRadius> radii;
   for (std::size_t i = 0; i < found.size(); ++i) {
     const Lamp* lamp = find_lamp(found[i]);
@@ -560,7 +560,7 @@ void LightDetector::correct_for_motion(const ImageView& lines, const Background&
     }
   }
   for (std::size_t i = 0; i < lights.size(); ++i) {
-    if (ovals[i]) shape_.correct_light(*ovals[i], motions[i], lights[i]);
+    if (ovals[i]) shape_.correct_center_for_motion(*ovals[i], motions[i], lights[i]);
   }
 }
 
@@ -692,8 +692,8 @@ std::optional<double> LightDetector::compute_log_aspect_difference(const Measure
   return off < max_off ? std::optional(off) : std::nullopt;
 }
 
-void LightDetector::reject_other_size(const std::optional<InverseHeight>& inverse_height,
-                                      std::vector<MeasuredLight>& lights) const {
+void LightDetector::reject_lights_of_other_size(const std::optional<InverseHeight>& inverse_height,
+                                                std::vector<MeasuredLight>& lights) const {
   constexpr double max_outline_off = 0.1, max_sds = 4, max_centroid_off = 0.35;
   constexpr int min_lamps = 3;
   struct Size {
@@ -728,8 +728,8 @@ void LightDetector::reject_other_size(const std::optional<InverseHeight>& invers
   }
 }
 
-void LightDetector::reject_misplaced(const std::optional<InverseHeight>& inverse_height,
-                                     std::vector<MeasuredLight>& lights) const {
+void LightDetector::reject_misplaced_lights(const std::optional<InverseHeight>& inverse_height,
+                                            std::vector<MeasuredLight>& lights) const {
   constexpr int min_lamps = 2;
   constexpr double max_off_fraction = 0.1;
   if (!inverse_height) return;
@@ -828,13 +828,13 @@ void LightDetector::identify_lamps(const std::optional<InverseHeight>& inverse_h
       reject(light, LightReason::wrong_shape);
     }
   }
-  reject_other_size(inverse_height, lights);
+  reject_lights_of_other_size(inverse_height, lights);
   // A classifier does not use the frequencies of the map.
   if (camera_.row_time_s && !classifier_) {
     reject_periods(lamps_, *camera_.row_time_s, lights);
   }
   for (const Lamp& lamp : lamps_.lamps) keep_best_light(lamp.id, lights);
-  reject_misplaced(inverse_height, lights);
+  reject_misplaced_lights(inverse_height, lights);
   const bool sure = std::ranges::any_of(lights, [](const Light& light) {
     return light.lamp && light.stripes.periods >= kMinReliablePeriods;
   });

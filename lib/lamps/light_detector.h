@@ -98,8 +98,8 @@ class LightDetector {
   std::vector<LampInPlane> list_lamps_in_plane(const std::vector<ModulatedLight>& found,
                                                const OutlineFits& fits) const;
   /// Returns the radii of discs of known size.
-  std::vector<LampRadius> list_radii(const std::vector<ModulatedLight>& found,
-                                     const OutlineFits& fits) const;
+  std::vector<LampRadius> list_disc_radii(const std::vector<ModulatedLight>& found,
+                                          const OutlineFits& fits) const;
   /// Returns the radius of a lamp in the level plane. Without a lamp, returns the common radius of
   /// all lamps of the map. Returns std::nullopt if it is no disc of known size, if the lamps differ
   /// by more than 15 %, or if the height is unknown.
@@ -124,11 +124,11 @@ class LightDetector {
   /// rotation and translation of the map. The tolerance is 10 % of the lamp's size and of its
   /// distance from their mean, plus half of its size without an outline. Has no effect if a light
   /// with more periods exceeds it.
-  void reject_misplaced(const std::optional<InverseHeight>& inverse_height,
-                        std::vector<MeasuredLight>& lights) const;
+  void reject_misplaced_lights(const std::optional<InverseHeight>& inverse_height,
+                               std::vector<MeasuredLight>& lights) const;
   /// Rejects lights whose radius differs from that of their lamp, if at least three others agree.
-  void reject_other_size(const std::optional<InverseHeight>& inverse_height,
-                         std::vector<MeasuredLight>& lights) const;
+  void reject_lights_of_other_size(const std::optional<InverseHeight>& inverse_height,
+                                   std::vector<MeasuredLight>& lights) const;
   /// Returns the radius of a light in the level plane; std::nullopt for rectangles.
   std::optional<double> measure_radius(const MeasuredLight& light) const;
   /// Returns the absolute difference between the log aspect ratios of a light and a lamp. Returns

@@ -13,7 +13,7 @@ std::optional<Readout> ReadoutDirectionEvidence::readout_direction() const {
   return std::nullopt;
 }
 
-double sum_evidence(std::span<const Light> lights) {
+double sum_readout_evidence(std::span<const Light> lights) {
   double sum = 0;
   for (const Light& light : lights) {
     if (!is_light_modulated(light)) continue;
@@ -22,11 +22,11 @@ double sum_evidence(std::span<const Light> lights) {
   return sum;
 }
 
-void add_evidence(const ImageView& image, ReadoutDirectionEvidence& evidence) {
+void add_readout_evidence(const ImageView& image, ReadoutDirectionEvidence& evidence) {
   const LightDetector by_rows({}, {Readout::rows, {}, {}});
-  evidence.rows += sum_evidence(by_rows.detect_lights(image));
+  evidence.rows += sum_readout_evidence(by_rows.detect_lights(image));
   evidence.columns +=
-      sum_evidence(by_rows.copy_with_readout(Readout::columns).detect_lights(image));
+      sum_readout_evidence(by_rows.copy_with_readout(Readout::columns).detect_lights(image));
 }
 
 std::optional<Readout> estimate_readout(std::size_t images,
@@ -39,7 +39,7 @@ std::optional<Readout> estimate_readout(std::size_t images,
     const ImageView frame = image(i);
     if (frame.empty()) continue;
     const double before = evidence.rows + evidence.columns;
-    add_evidence(frame, evidence);
+    add_readout_evidence(frame, evidence);
     if (evidence.rows + evidence.columns > before) ++used;
     if (evidence.rows + evidence.columns >= sufficient_evidence && evidence.readout_direction())
       break;
@@ -52,8 +52,8 @@ LightsWithReadout detect_both_readouts(const LightDetector& detector, const Imag
   const Readout other_readout = default_readout == Readout::rows ? Readout::columns : Readout::rows;
   LightsWithReadout result{default_readout, detector.detect_lights(image)};
   std::vector<Light> lights = detector.copy_with_readout(other_readout).detect_lights(image);
-  const double default_evidence = sum_evidence(result.lights),
-               other_evidence = sum_evidence(lights);
+  const double default_evidence = sum_readout_evidence(result.lights),
+               other_evidence = sum_readout_evidence(lights);
   const ReadoutDirectionEvidence evidence =
       default_readout == Readout::rows ? ReadoutDirectionEvidence{default_evidence, other_evidence}
                                        : ReadoutDirectionEvidence{other_evidence, default_evidence};

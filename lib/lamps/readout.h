@@ -28,11 +28,11 @@ struct ReadoutDirectionEvidence {
 
 /// Returns the sum of ReadoutDirectionEvidence over `lights`, which were detected with one readout
 /// direction.
-double sum_evidence(std::span<const Light> lights);
+double sum_readout_evidence(std::span<const Light> lights);
 
 /// Adds the evidence of a whole image. With the correct readout direction a lamp has stripes; with
 /// the other one it breaks into pieces or has no stripes.
-void add_evidence(const ImageView& image, ReadoutDirectionEvidence& evidence);
+void add_readout_evidence(const ImageView& image, ReadoutDirectionEvidence& evidence);
 
 /// Estimates the readout direction from images in their order, from at most eight images with
 /// modulated lights. Stops when the evidence is clear. Returns std::nullopt if it is not.

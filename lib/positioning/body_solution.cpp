@@ -281,7 +281,8 @@ std::optional<BodySolution> estimate_free_tilt(const FrameObservations& frame,
 
 }  // namespace
 
-BodySolution estimate_from_all(const FrameObservations& frame, const BodyProblem& problem) {
+BodySolution estimate_pose_from_all_lamps(const FrameObservations& frame,
+                                          const BodyProblem& problem) {
   // Three lamps have several solutions even if roll and pitch are roughly known.
   const bool has_several = problem.prior.is_tilt_estimated() && frame.size == 3;
   if (has_several || is_roll_pitch_unknown(problem.prior)) {

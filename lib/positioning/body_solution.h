@@ -92,6 +92,7 @@ bool is_position_determined(const FrameObservations& frame, const BodyPrior& pri
 ///   undetermined  lamps and priors do not determine the position
 ///   ambiguous     another state is nearly as likely: by a factor of exp(-6) or more. Such states
 ///                 are the candidates.
-BodySolution estimate_from_all(const FrameObservations& frame, const BodyProblem& problem);
+BodySolution estimate_pose_from_all_lamps(const FrameObservations& frame,
+                                          const BodyProblem& problem);
 
 }  // namespace vlp

@@ -177,7 +177,7 @@ CommonErrors::RayJacobian CommonErrors::differentiate_ray(const Eigen::Vector3d&
   return effect;
 }
 
-CommonErrors::GainMatrix<2> CommonErrors::compute_residual_gain(
+CommonErrors::GainMatrix<2> CommonErrors::differentiate_residuals(
     const Observations& observations, std::size_t index,
     const LinearizedObservation& linearized) const {
   const auto& [sightings, lamps, lens, body_from_base, arm_m] = observations;
@@ -192,15 +192,15 @@ CommonErrors::GainMatrix<2> CommonErrors::compute_residual_gain(
 }
 
 template <int States>
-CommonErrors::GainMatrix<States> CommonErrors::compute_fix_gain(const Observations& observations,
-                                                                const BodyFix& fix) const {
+CommonErrors::GainMatrix<States> CommonErrors::differentiate_fix(const Observations& observations,
+                                                                 const BodyFix& fix) const {
   const EvaluatedState body(fix.state);
   const Eigen::Matrix<double, States, kBodyStates> covariance = fix.covariance.topRows<States>();
   GainMatrix<States> whole(num_shared_errors());
   for (std::size_t i = 0; i < observations.sightings.size(); ++i) {
     const LinearizedObservation seen =
         linearize_observation(observations.sightings[i], body, observations.arm_m);
-    const GainMatrix<2> by_errors = compute_residual_gain(observations, i, seen);
+    const GainMatrix<2> by_errors = differentiate_residuals(observations, i, seen);
     const Eigen::Matrix<double, States, 2> gain = covariance.lazyProduct(seen.jacobian.transpose());
     whole.jacobian_wrt_shared.noalias() += gain.lazyProduct(by_errors.jacobian_wrt_shared);
     whole.add(observations.lamps[i], gain * by_errors.jacobian_wrt_lamp[0]);
@@ -214,7 +214,7 @@ void CommonErrors::add_covariances(const Observations& observations, const BodyS
   for (std::size_t i = 0; i < covariances.size(); ++i) {
     const LinearizedObservation seen =
         linearize_observation(observations.sightings[i], body, observations.arm_m);
-    covariances[i] = propagate(compute_residual_gain(observations, i, seen));
+    covariances[i] = propagate(differentiate_residuals(observations, i, seen));
   }
 }
 
@@ -265,9 +265,9 @@ double compute_expected_chi_squared(const CommonErrors::Observations& observatio
   return sum - ((2 * covariance.inverse() - information) * common).trace();
 }
 
-template CommonErrors::GainMatrix<4> CommonErrors::compute_fix_gain(
+template CommonErrors::GainMatrix<4> CommonErrors::differentiate_fix(
     const Observations& observations, const BodyFix& fix) const;
-template CommonErrors::GainMatrix<kBodyStates> CommonErrors::compute_fix_gain(
+template CommonErrors::GainMatrix<kBodyStates> CommonErrors::differentiate_fix(
     const Observations& observations, const BodyFix& fix) const;
 template Matrix4 CommonErrors::propagate(const GainMatrix<4>& gain) const;
 template BodyCovariance CommonErrors::propagate(const GainMatrix<kBodyStates>& gain) const;

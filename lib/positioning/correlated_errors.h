@@ -107,7 +107,7 @@ class CommonErrors {
   /// Returns the gain of the least-squares fix (estimate_body_state()): of (X, Y, Z, yaw), or of
   /// all states of a body (BodyIndex).
   template <int States>
-  GainMatrix<States> compute_fix_gain(const Observations& observations, const BodyFix& fix) const;
+  GainMatrix<States> differentiate_fix(const Observations& observations, const BodyFix& fix) const;
   /// Computes the covariance of the residuals of each observation from the common errors, in
   /// standard deviations of the pixel.
   void add_covariances(const Observations& observations, const BodyState& state,
@@ -136,8 +136,8 @@ class CommonErrors {
     bool is_known;
   };
   /// Derivatives of the residuals of one observation with respect to the errors.
-  GainMatrix<2> compute_residual_gain(const Observations& observations, std::size_t index,
-                                      const LinearizedObservation& linearized) const;
+  GainMatrix<2> differentiate_residuals(const Observations& observations, std::size_t index,
+                                        const LinearizedObservation& linearized) const;
   /// Returns the row in `joint` of each row of the covariance, -1 if it is unknown. Adds the lamps.
   std::vector<Eigen::Index> assign_rows(std::span<const Lamp> lamps, const JointCovariance& joint);
   /// Returns the covariance of a lamp's position, m^2; `lamp` is its index in the map.

@@ -44,7 +44,7 @@ std::optional<BodyFix> find_exact_fix(FrameObservations& frame, const BodyPrior&
     return estimate_body_state(frame.observations_span(), problem, {level, prior.mean.motion});
   // Exact observations neither contradict the fix nor fit a mirrored map: the limit has no effect.
   constexpr double residual_limit = 0.1;
-  const BodySolution found = estimate_robust(frame, problem, residual_limit);
+  const BodySolution found = estimate_pose_robustly(frame, problem, residual_limit);
   return found.status == FixStatus::ok ? std::optional(found.fix) : std::nullopt;
 }
 
@@ -62,7 +62,8 @@ std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> 
   for (const Eigen::Vector3d& lamp_m : lamps_m) {
     const auto seen = make_observation(lamp_m, lens, camera_from_level, level, noise_px, row_clock);
     if (!seen || !(lamp_m.z() > level.position_m.z())) return std::nullopt;
-    frame.add_current(*seen, static_cast<int>(frame.size), std::numeric_limits<double>::infinity());
+    frame.add_current_observation(*seen, static_cast<int>(frame.size),
+                                  std::numeric_limits<double>::infinity());
   }
   const auto fix = find_exact_fix(frame, prior, level);
   if (!fix) return std::nullopt;
@@ -73,10 +74,10 @@ std::optional<BodyPoseBound> compute_pose_crlb(std::span<const Eigen::Vector3d> 
   // The fix is at rest and level to rounding.
   limit.fix.state.motion = prior.mean.motion;
   BodyPrior level_prior = prior;
-  level_prior.set_sd(kBodyRoll, 0);
+  level_prior.set_state_sd(kBodyRoll, 0);
   BodyPrior standing = level_prior;
-  standing.set_sd(kBodyVelocity, 0);
-  standing.set_sd(kBodyYawRate, 0);
+  standing.set_state_sd(kBodyVelocity, 0);
+  standing.set_state_sd(kBodyYawRate, 0);
   const auto noise = compute_pose_covariance(frame, standing, limit.fix.state),
              moving = compute_pose_covariance(frame, level_prior, limit.fix.state);
   if (!noise || !moving) return std::nullopt;

@@ -9,8 +9,8 @@
 namespace vlp {
 namespace {
 
-Eigen::Vector3d turn_over(const Eigen::Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
-Eigen::Vector2d turn_over(const Eigen::Vector2d& v) { return {v.x(), -v.y()}; }
+Eigen::Vector3d rotate_upside_down(const Eigen::Vector3d& v) { return {v.x(), -v.y(), -v.z()}; }
+Eigen::Vector2d rotate_upside_down(const Eigen::Vector2d& v) { return {v.x(), -v.y()}; }
 
 /// Signs of X, Y, Z, yaw, velocity, yaw rate, roll and pitch (BodyIndex).
 constexpr std::array<double, kBodyStates> kSigns{1, -1, -1, -1, 1, -1, -1, 1, -1};
@@ -20,24 +20,24 @@ const Eigen::DiagonalMatrix<double, kBodyStates> kTurnedOver(
 
 }  // namespace
 
-Inclination turn_over(const Inclination& inclination) {
+Inclination rotate_upside_down(const Inclination& inclination) {
   return {inclination.roll_rad, -inclination.pitch_rad};
 }
 
-CameraMount turn_over(const CameraMount& mount) {
-  return {turn_over(mount.position_in_robot_m), -mount.yaw_in_robot_rad};
+CameraMount rotate_upside_down(const CameraMount& mount) {
+  return {rotate_upside_down(mount.position_in_robot_m), -mount.yaw_in_robot_rad};
 }
 
-LampMap turn_over(LampMap map) {
-  for (Lamp& lamp : map.lamps) lamp.position_m = turn_over(lamp.position_m);
+LampMap rotate_upside_down(LampMap map) {
+  for (Lamp& lamp : map.lamps) lamp.position_m = rotate_upside_down(lamp.position_m);
   return map;
 }
 
-Calibration turn_over(Calibration calibration) {
+Calibration rotate_upside_down(Calibration calibration) {
   if (auto& joint = calibration.covariance) {
     Eigen::Index row = joint->first_lamp_row();
     for (JointCovariance::LampPosition& lamp : joint->lamps) {
-      lamp.position_m = turn_over(lamp.position_m);
+      lamp.position_m = rotate_upside_down(lamp.position_m);
       joint->matrix.middleRows<2>(row + 1) *= -1;
       joint->matrix.middleCols<2>(row + 1) *= -1;
       row += 3;
@@ -46,39 +46,40 @@ Calibration turn_over(Calibration calibration) {
   return calibration;
 }
 
-BodyState turn_over(const BodyState& state) {
+BodyState rotate_upside_down(const BodyState& state) {
   const auto& [pose, motion] = state;
-  return {{turn_over(pose.position_m), -pose.yaw_rad},
-          {turn_over(motion.velocity_m_per_s), -motion.yaw_rate_rad_per_s,
-           turn_over(motion.inclination)}};
+  return {{rotate_upside_down(pose.position_m), -pose.yaw_rad},
+          {rotate_upside_down(motion.velocity_m_per_s), -motion.yaw_rate_rad_per_s,
+           rotate_upside_down(motion.inclination)}};
 }
 
-Sensors turn_over(Sensors sensors) {
-  if (sensors.inclination) sensors.inclination = turn_over(*sensors.inclination);
+Sensors rotate_upside_down(Sensors sensors) {
+  if (sensors.inclination) sensors.inclination = rotate_upside_down(*sensors.inclination);
   if (auto& known = sensors.height_and_yaw) {
     known->z_m *= -1;
     known->yaw_rad *= -1;
   }
   if (auto& motion = sensors.motion) {
-    motion->velocity_m_per_s = turn_over(motion->velocity_m_per_s);
+    motion->velocity_m_per_s = rotate_upside_down(motion->velocity_m_per_s);
     motion->yaw_rate_rad_per_s *= -1;
   }
   if (sensors.height) sensors.height->z_m *= -1;
   if (auto& prior = sensors.prior) {
-    prior = {turn_over(prior->mean), kTurnedOver * prior->covariance * kTurnedOver};
+    prior = {rotate_upside_down(prior->mean), kTurnedOver * prior->covariance * kTurnedOver};
   }
   return sensors;
 }
 
-Fix turn_over(Fix fix) {
-  fix.state = turn_over(fix.state);
-  for (FixCandidate& candidate : fix.candidates) candidate.state = turn_over(candidate.state);
+Fix rotate_upside_down(Fix fix) {
+  fix.state = rotate_upside_down(fix.state);
+  for (FixCandidate& candidate : fix.candidates)
+    candidate.state = rotate_upside_down(candidate.state);
   fix.covariance = kTurnedOver * fix.covariance * kTurnedOver;
   fix.noise_covariance = kTurnedOver * fix.noise_covariance * kTurnedOver;
   return fix;
 }
 
-LampProjection turn_over(LampProjection projection) {
+LampProjection rotate_upside_down(LampProjection projection) {
   projection.jacobian = projection.jacobian * kTurnedOver;
   return projection;
 }

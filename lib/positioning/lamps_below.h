@@ -11,22 +11,22 @@
 /// only changes signs: of y, z, yaw, pitch, vy and yaw rate. T is its own inverse.
 namespace vlp {
 
-Inclination turn_over(const Inclination& inclination);
-CameraMount turn_over(const CameraMount& mount);
+Inclination rotate_upside_down(const Inclination& inclination);
+CameraMount rotate_upside_down(const CameraMount& mount);
 /// Rotates the positions of the lamps. Shapes are unchanged.
-LampMap turn_over(LampMap map);
+LampMap rotate_upside_down(LampMap map);
 /// Rotates positions and errors of the lamps; the rest refers to the camera.
-Calibration turn_over(Calibration calibration);
-Sensors turn_over(Sensors sensors);
-BodyState turn_over(const BodyState& state);
+Calibration rotate_upside_down(Calibration calibration);
+Sensors rotate_upside_down(Sensors sensors);
+BodyState rotate_upside_down(const BodyState& state);
 /// Rotates states and covariances of a fix.
-Fix turn_over(Fix fix);
-LampProjection turn_over(LampProjection projection);
+Fix rotate_upside_down(Fix fix);
+LampProjection rotate_upside_down(LampProjection projection);
 
-/// Returns turn_over(value) for a map with lamps below the camera, otherwise the value.
+/// Returns rotate_upside_down(value) for a map with lamps below the camera, otherwise the value.
 template <typename Value>
-Value turn_over_if(bool lamps_below_camera, const Value& value) {
-  return lamps_below_camera ? turn_over(value) : value;
+Value rotate_upside_down_if(bool lamps_below_camera, const Value& value) {
+  return lamps_below_camera ? rotate_upside_down(value) : value;
 }
 
 }  // namespace vlp

@@ -97,7 +97,7 @@ bool is_consistent(const BodySolution& solution, const FrameObservations& frame,
 
 FrameObservations select_lamps(const FrameObservations& frame, const Agreeing& agreeing) {
   FrameObservations remaining = frame;
-  remaining.keep_selected(agreeing);
+  remaining.keep_observations(agreeing);
   return remaining;
 }
 
@@ -174,7 +174,7 @@ BodySolution estimate_majority(FrameObservations& frame, const BodyProblem& prob
     if (agreeing.count() < min_lamps || 2 * agreeing.count() <= frame.size) return none;
     const FrameObservations remaining = select_lamps(frame, agreeing);
     if (remaining.num_current < 2) return none;
-    const BodySolution solution = estimate_from_all(remaining, problem);
+    const BodySolution solution = estimate_pose_from_all_lamps(remaining, problem);
     if (solution.status != FixStatus::ok) return solution;
     const Agreeing now_agreeing = Agreement(solution.fix.state, frame, problem, limit_m).agreeing;
     if (now_agreeing == agreeing) {
@@ -189,9 +189,9 @@ BodySolution estimate_majority(FrameObservations& frame, const BodyProblem& prob
 
 }  // namespace
 
-BodySolution estimate_robust(FrameObservations& frame, const BodyProblem& problem,
-                             double max_residual_fraction) {
-  const BodySolution all = estimate_from_all(frame, problem);
+BodySolution estimate_pose_robustly(FrameObservations& frame, const BodyProblem& problem,
+                                    double max_residual_fraction) {
+  const BodySolution all = estimate_pose_from_all_lamps(frame, problem);
   if (frame.size < 3) {
     const bool is_contradicted =
         all.status == FixStatus::ok && !is_within_prior(problem.prior, all.fix.state);
@@ -203,7 +203,7 @@ BodySolution estimate_robust(FrameObservations& frame, const BodyProblem& proble
   if (is_all_consistent && (all.status != FixStatus::ok || excess <= kMaxReducedChiSquared))
     return all;
   const FrameObservations mirror_frame = mirror_lamp_positions(frame);
-  const BodySolution mirror_image = estimate_from_all(mirror_frame, problem);
+  const BodySolution mirror_image = estimate_pose_from_all_lamps(mirror_frame, problem);
   const bool is_mirrored =
       mirror_image.status == FixStatus::ok &&
       is_consistent(mirror_image, mirror_frame, problem, limit_m) &&

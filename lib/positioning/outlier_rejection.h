@@ -30,11 +30,11 @@ namespace vlp {
 /// If residuals below these limits exceed five standard deviations, and the mirror image fits a
 /// hundred times better, the status is `mirrored_map`, too.
 ///
-/// Additional statuses: those of estimate_from_all(), and
+/// Additional statuses: those of estimate_pose_from_all_lamps(), and
 ///   inconsistent  height, velocity, yaw rate or roll and pitch differ from the prior by more than
 ///                 five standard deviations
-BodySolution estimate_robust(FrameObservations& frame, const BodyProblem& problem,
-                             double max_residual_fraction);
+BodySolution estimate_pose_robustly(FrameObservations& frame, const BodyProblem& problem,
+                                    double max_residual_fraction);
 
 /// Lamps of a frame that contradict the others, as indices: none, one or several.
 using OutlierLamps = std::bitset<kMaxSightings>;

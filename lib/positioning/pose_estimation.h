@@ -46,7 +46,7 @@ struct BodyPrior : StatePrior {
 
   /// Sets the standard deviation of a state without correlations; kBodyVelocity: of both
   /// components; kBodyRoll: of roll and pitch.
-  void set_sd(BodyIndex state, double sd) {
+  void set_state_sd(BodyIndex state, double sd) {
     const int count = state == kBodyVelocity || state == kBodyRoll ? 2 : 1;
     covariance.middleRows(state, count).setZero();
     covariance.middleCols(state, count).setZero();

@@ -79,7 +79,7 @@ struct FrameObservations {
   std::span<const LampObservation> observations_span() const { return {sightings.data(), size}; }
 
   /// Adds an observation of the current frame.
-  void add_current(const LampObservation& observation, int id, double nearest_lamp_m) {
+  void add_current_observation(const LampObservation& observation, int id, double nearest_lamp_m) {
     sightings[size] = observation;
     ids[size] = id;
     nearest_m[size] = nearest_lamp_m;
@@ -88,7 +88,7 @@ struct FrameObservations {
 
   /// Removes all observations except those in `kept`. The removed ones of the current frame count
   /// as rejected.
-  void keep_selected(const std::bitset<kMaxSightings>& kept) {
+  void keep_observations(const std::bitset<kMaxSightings>& kept) {
     std::size_t next = 0, next_current = 0;
     for (std::size_t i = 0; i < size; ++i) {
       if (kept[i]) {

@@ -176,13 +176,14 @@ class Positioner::Impl {
  public:
   Impl(const LampMap& map, const Calibration& calibration, const PositionerOptions& options)
       : lamps_below_camera_(map.lamps_below_camera),
-        lamps_(sorted_by_id(turn_over_if(map.lamps_below_camera, map).lamps)),
+        lamps_(sorted_by_id(rotate_upside_down_if(map.lamps_below_camera, map).lamps)),
         lens_(calibration.camera.lens_model, calibration.camera.intrinsics),
         origin_m_(get_lamp_center(lamps_)),
         base_from_camera_(compute_level_from_camera_matrix(calibration, options.correction)),
-        common_(lamps_, turn_over_if(map.lamps_below_camera, calibration), options.correction),
-        mount_(turn_over_if(map.lamps_below_camera,
-                            options.mount.value_or(CameraMount{Eigen::Vector3d::Zero(), 0}))),
+        common_(lamps_, rotate_upside_down_if(map.lamps_below_camera, calibration),
+                options.correction),
+        mount_(rotate_upside_down_if(map.lamps_below_camera, options.mount.value_or(CameraMount{
+                                                                 Eigen::Vector3d::Zero(), 0}))),
         body_from_base_(rotation_about_z(mount_.yaw_in_robot_rad)),
         body_from_camera_(body_from_base_ * base_from_camera_),
         max_residual_fraction_(options.max_residual_fraction),
@@ -227,7 +228,7 @@ class Positioner::Impl {
     if (may_move && !row_clock_)
       return make_fix_without_pose(FixStatus::row_time_unknown, unknown_lamps);
     const BodyProblem problem{mount_.position_in_robot_m, prior};
-    BodySolution solution = estimate_robust(frame, problem, max_residual_fraction_);
+    BodySolution solution = estimate_pose_robustly(frame, problem, max_residual_fraction_);
     if (solution.status == FixStatus::ok && checks_residuals_)
       reject_contradicting(frame, problem, solution);
     Fix fix = solution.status == FixStatus::ok ? make_consistent_fix(frame, problem, solution.fix)
@@ -293,14 +294,15 @@ class Positioner::Impl {
     } else {
       if (const auto& motion = sensors.motion) {
         prior.mean.motion = {motion->velocity_m_per_s, motion->yaw_rate_rad_per_s, {}};
-        prior.set_sd(kBodyVelocity, motion->velocity_sd_m_per_s);
-        prior.set_sd(kBodyYawRate, motion->yaw_rate_sd_rad_per_s);
+        prior.set_state_sd(kBodyVelocity, motion->velocity_sd_m_per_s);
+        prior.set_state_sd(kBodyYawRate, motion->yaw_rate_sd_rad_per_s);
       }
       if (sensors.inclination) prior.mean.motion.inclination = *sensors.inclination;
-      if (sensors.inclination_sigma_rad > 0) prior.set_sd(kBodyRoll, sensors.inclination_sigma_rad);
+      if (sensors.inclination_sigma_rad > 0)
+        prior.set_state_sd(kBodyRoll, sensors.inclination_sigma_rad);
       if (const auto& height = sensors.height) {
         prior.mean.pose.position_m.z() = height->z_m;
-        prior.set_sd(kBodyZ, height->sd_m);
+        prior.set_state_sd(kBodyZ, height->sd_m);
       }
     }
     prior.mean.pose.position_m -= origin_m_;
@@ -312,8 +314,8 @@ class Positioner::Impl {
     const HeightAndYaw& known = *sensors.height_and_yaw;
     prior.mean.pose = {{0, 0, known.z_m - origin_m_.z()}, known.yaw_rad - mount_.yaw_in_robot_rad};
     prior.height_point_m = mount_.position_in_robot_m;
-    prior.set_sd(kBodyZ, known.z_sd_m);
-    prior.set_sd(kBodyYaw, known.yaw_sd_rad);
+    prior.set_state_sd(kBodyZ, known.z_sd_m);
+    prior.set_state_sd(kBodyYaw, known.yaw_sd_rad);
   }
 
   /// Adds the detections of lamps of the map to the frame. `time_s` is the time of the detections.
@@ -435,9 +437,9 @@ class Positioner::Impl {
     if (!common_.has_known_errors()) return common;
     const MapObservations observations(frame, problem, *this);
     if (problem.prior.is_motion_or_tilt_free())
-      return common_.propagate(common_.compute_fix_gain<kBodyStates>(observations.errors, fix));
+      return common_.propagate(common_.differentiate_fix<kBodyStates>(observations.errors, fix));
     common.topLeftCorner<4, 4>() =
-        common_.propagate(common_.compute_fix_gain<4>(observations.errors, fix));
+        common_.propagate(common_.differentiate_fix<4>(observations.errors, fix));
     return common;
   }
 
@@ -449,7 +451,7 @@ class Positioner::Impl {
     Fix fix = make_fix(frame, problem, solution, BodyCovariance::Zero());
     // Noise that is not stated is no contradiction.
     const bool may_contradict = checks_residuals_ && frame.noise_is_stated;
-    const double scale = may_contradict ? estimate_contradiction(fix) : 1;
+    const double scale = may_contradict ? compute_birge_ratio(fix) : 1;
     if (scale > 1) {
       if (const auto covariance = find_wider_covariance(frame, problem, solution)) {
         fix = make_fix(frame, problem, solution, *covariance - solution.covariance);
@@ -483,9 +485,9 @@ class Positioner::Impl {
     constexpr double tilt_sd_rad = 0.15, speed_sd_m_per_s = 1.5, yaw_rate_sd_rad_per_s = 1;
     const BodyPrior& known = problem.prior;
     BodyPrior tilted = known, moving = known;
-    tilted.set_sd(kBodyRoll, tilt_sd_rad);
-    moving.set_sd(kBodyVelocity, speed_sd_m_per_s);
-    moving.set_sd(kBodyYawRate, yaw_rate_sd_rad_per_s);
+    tilted.set_state_sd(kBodyRoll, tilt_sd_rad);
+    moving.set_state_sd(kBodyVelocity, speed_sd_m_per_s);
+    moving.set_state_sd(kBodyYawRate, yaw_rate_sd_rad_per_s);
     std::optional<BodyCovariance> found;
     const auto add = [&](const BodyPrior& prior) {
       const auto other =
@@ -577,24 +579,27 @@ Positioner::Positioner(const LampMap& map, const Calibration& calibration,
 Fix Positioner::compute_position_fix(std::span<const Detection> detections,
                                      const Sensors& sensors) const noexcept {
   const bool below = impl_->is_above_lamps();
-  return turn_over_if(below,
-                      impl_->compute_position_fix(detections, turn_over_if(below, sensors), {}));
+  return rotate_upside_down_if(
+      below, impl_->compute_position_fix(detections, rotate_upside_down_if(below, sensors), {}));
 }
 
 Fix Positioner::compute_position_fix(std::span<const Detection> detections, const Sensors& sensors,
                                      std::span<const EarlierFrame> earlier) const noexcept {
   const bool below = impl_->is_above_lamps();
-  return turn_over_if(
-      below, impl_->compute_position_fix(detections, turn_over_if(below, sensors), earlier));
+  return rotate_upside_down_if(
+      below,
+      impl_->compute_position_fix(detections, rotate_upside_down_if(below, sensors), earlier));
 }
 
 Eigen::Matrix3d Positioner::compute_level_from_camera(const Inclination& inclination) const {
-  return impl_->compute_level_from_camera(turn_over_if(impl_->is_above_lamps(), inclination));
+  return impl_->compute_level_from_camera(
+      rotate_upside_down_if(impl_->is_above_lamps(), inclination));
 }
 
 LampProjection Positioner::project_lamp(int lamp, const BodyState& state) const noexcept {
   const bool below = impl_->is_above_lamps();
-  return turn_over_if(below, impl_->project_lamp(lamp, turn_over_if(below, state)));
+  return rotate_upside_down_if(below,
+                               impl_->project_lamp(lamp, rotate_upside_down_if(below, state)));
 }
 
 DetectionResidual Positioner::compute_detection_residual(const Detection& detection,

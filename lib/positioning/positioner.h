@@ -33,7 +33,7 @@ struct PositionerOptions {
   std::optional<CameraMount> mount;
   /// Residual limit as a fraction of the RMS radius of all lamps. Lamps are
   /// inconsistent if the residual of one exceeds it, or if it is too close to another lamp
-  /// (estimate_robust). Noise, lens and an uncorrected tilt of 5 degrees cause residuals
+  /// (estimate_pose_robustly()). Noise, lens and an uncorrected tilt of 5 degrees cause residuals
   /// of 0.05 or less.
   double max_residual_fraction = 0.1;
   /// Standard deviation per axis, in the image, of detections without sigma_px. It scales the
@@ -144,7 +144,7 @@ class Positioner {
 
   /// Computes the fix of one frame. Neither allocates memory nor throws.
   ///
-  /// Least squares over the pixels and the known states (estimate_robust()), from
+  /// Least squares over the pixels and the known states (estimate_pose_robustly()), from
   /// initial values in closed form. One lamp requires height and yaw. Lamps that contradict the
   /// others are rejected (flag_outlier_lamps()).
   Fix compute_position_fix(std::span<const Detection> detections,

@@ -53,7 +53,7 @@ double compute_chi_squared_limit(double degrees_of_freedom) {
   return compute_chi_squared_bound(kSigmasOfOneInTenThousand, std::max(1.0, degrees_of_freedom));
 }
 
-double estimate_contradiction(const Fix& fix) {
+double compute_birge_ratio(const Fix& fix) {
   const double noise_chi_squared = fix.chi_squared - 2 * fix.common_chi_squared;
   if (noise_chi_squared <= compute_chi_squared_limit(fix.redundancy)) return 1;
   return std::sqrt(noise_chi_squared / std::max(1.0, fix.redundancy));

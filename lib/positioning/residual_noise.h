@@ -34,6 +34,6 @@ double compute_chi_squared_limit(double degrees_of_freedom);
 /// noise: if chi-squared exceeds its 1e-4 bound. Otherwise returns 1 (Birge ratio; Birge 1932,
 /// Phys. Rev. 40, 207). Twice the expectation of the errors of calibration and lamp map is
 /// attributed to them, since fixes share one realization of these.
-double estimate_contradiction(const Fix& fix);
+double compute_birge_ratio(const Fix& fix);
 
 }  // namespace vlp

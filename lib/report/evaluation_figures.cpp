@@ -41,7 +41,7 @@ void add_horizontal_statistics(std::vector<ReportStatistic>& figures,
 
 std::string describe_comparison(const Comparison& comparison) {
   std::string note = "Compared with the other fixes: ";
-  for (std::size_t i = 0; const ComparedQuantity& quantity : list_quantities()) {
+  for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
     const QuantityComparison& compared = comparison.quantities[i++];
     if (compared.pairs == 0 && i > 1) continue;
     const double factor = quantity.units_per_si;

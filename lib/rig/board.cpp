@@ -150,9 +150,9 @@ static void describe_squares(Io& io, Described<Io, Board> board) {
   io.required("dictionary", board.family, PlainText())
       .check(board.family.starts_with("DICT_"),
              "should be one of OpenCV's dictionaries, such as DICT_5X5_100");
-  io.with_default("first_id", board.first_id, kTagId);
-  io.with_default("top_left", board.top_left_white,
-                  Words{kSquareColors, "the colors of a square are: "});
+  io.optional_with_default("first_id", board.first_id, kTagId);
+  io.optional_with_default("top_left", board.top_left_white,
+                           Words{kSquareColors, "the colors of a square are: "});
 }
 
 template <typename Io>

@@ -29,7 +29,7 @@ constexpr Range kSurveySd{0, 1, "m"};         // larger values indicate millimet
 template <typename Io>
 void describe(Io& io, Described<Io, Lamp> lamp) {
   io.required("id", lamp.id);
-  io.required("position_m", lamp.position_m).item(2).check_within(kLampHeight);
+  io.required("position_m", lamp.position_m).item(2).check_range(kLampHeight);
   describe(io, lamp.shape);
   io.optional("frequency_hz", lamp.frequency_hz, Range{50, 1e6, "Hz"});
   io.optional("duty", lamp.duty, Range{0.01, 0.99, "(a fraction of the period)"});

@@ -324,7 +324,7 @@ void YamlField::check(bool is_valid, std::string_view problem) const {
   if (value_ && !is_valid) throw value_->make_error(std::string(problem));
 }
 
-void YamlField::check_within(const Range& range) const {
+void YamlField::check_range(const Range& range) const {
   if (value_) value_->read_number(range);
 }
 

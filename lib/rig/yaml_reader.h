@@ -82,7 +82,7 @@ class YamlField {
   /// Throws InputError with `problem` at the value if it is not valid.
   void check(bool is_valid, std::string_view problem) const;
   /// Throws InputError if a number is outside the range.
-  void check_within(const Range& range) const;
+  void check_range(const Range& range) const;
   /// Returns an item of a list. @pre The list has it.
   YamlField item(std::size_t index) const;
 
@@ -118,7 +118,7 @@ class YamlMap {
   }
   /// optional() of a key that is always written.
   template <typename T, typename... Limits>
-  YamlField with_default(const std::string& key, T&& target, const Limits&... limits) {
+  YamlField optional_with_default(const std::string& key, T&& target, const Limits&... limits) {
     return optional(key, target, limits...);
   }
   /// required() of a key that a writer writes after the others, so that a truncated file lacks it.

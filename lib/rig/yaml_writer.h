@@ -23,7 +23,7 @@ namespace vlp {
 /// Result of YamlWriter in place of YamlField: nothing is checked when a value is written.
 struct WrittenField {
   void check(bool, std::string_view) const {}
-  void check_within(const Range&) const {}
+  void check_range(const Range&) const {}
   WrittenField item(std::size_t) const { return {}; }
 };
 
@@ -57,7 +57,8 @@ class YamlWriter {
     return value == T() ? WrittenField() : required(key, value, limits...);
   }
   template <typename T, typename... Limits>
-  WrittenField with_default(std::string_view key, const T& value, const Limits&... limits) {
+  WrittenField optional_with_default(std::string_view key, const T& value,
+                                     const Limits&... limits) {
     return required(key, value, limits...);
   }
   template <typename T>

@@ -207,13 +207,13 @@ MapErrors detect_standing_errors(const LocateInput& input, const std::vector<Fix
                                        ? std::optional(fixes[i].state.motion.inclination)
                                        : sensors.inclination);
     auto& inclination = options.inclinations.back();
-    if (inclination) inclination = turn_over_if(below, *inclination);
+    if (inclination) inclination = rotate_upside_down_if(below, *inclination);
   }
   if (const auto& mount = input.positioner_options.mount)
-    options.yaw_in_robot_rad = turn_over_if(below, *mount).yaw_in_robot_rad;
+    options.yaw_in_robot_rad = rotate_upside_down_if(below, *mount).yaw_in_robot_rad;
   if (input.compute_lamp_offsets) options.max_captures = std::max<std::size_t>(frames.size(), 1);
-  MapErrors found =
-      detect_map_errors(frames, turn_over_if(below, input.lamps), input.calibration, options);
+  MapErrors found = detect_map_errors(frames, rotate_upside_down_if(below, input.lamps),
+                                      input.calibration, options);
   if (!below) return found;
   for (MapError& error : found.errors) error.offset_m.tail<2>() *= -1;
   for (LampOffset& offset : found.offsets) {
@@ -341,11 +341,11 @@ LocateResult locate_from_images(const LampImages& images, ImageUse use, LocateIn
   if (!input.calibration.camera.readout)
     input.calibration.camera.readout = intake.readout_direction();
   const Positioner positioner(input.lamps, input.calibration, input.positioner_options);
-  intake.set_repetition(
+  intake.set_detection_repetition(
       [&](const std::string& image, std::vector<Light> lights, const LightsInPlane& detect) {
         return repeat_if_tilted(input, positioner, image, std::move(lights), detect);
       });
-  Observations seen = intake.detect_in_all(list_lamp_images(images.images), progress);
+  Observations seen = intake.detect_lamps_in_images(list_lamp_images(images.images), progress);
   check_any_identified(images, seen);
   input.frames = collect_lamp_frames(seen.images);
   LocateResult result;

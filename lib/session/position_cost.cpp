@@ -17,7 +17,7 @@ namespace {
 /// A pose needs three lamps. Where lights are left out, three others may agree by chance.
 constexpr std::size_t kMinLights = 3, kMinMajority = 4;
 /// Standard deviation of roll and pitch of a camera that is mounted, or held, to look up.
-/// estimate_robust() rejects more than five times this value.
+/// estimate_pose_robustly() rejects more than five times this value.
 constexpr double kLeanSd_rad = 0.15;
 constexpr double kMaxSquare = kMaxResidualSds * kMaxResidualSds;
 
@@ -94,8 +94,9 @@ FrameObservations make_frame(const GroupedLights& image, std::vector<AssignedLig
     if (!ray) continue;
     const auto whitened = whiten_ray_jacobian(ray->direction, ray->d_direction_d_pixel, sd_px);
     if (!whitened) continue;
-    frame.add_current({lamp.position_m, ray->direction.normalized(), *whitened, sd_px, 0}, lamp.id,
-                      nearest_lamp_m(lamp, lamps));
+    frame.add_current_observation(
+        {lamp.position_m, ray->direction.normalized(), *whitened, sd_px, 0}, lamp.id,
+        nearest_lamp_m(lamp, lamps));
     kept.push_back(light);
   }
   assigned = std::move(kept);
@@ -117,10 +118,11 @@ std::vector<double> square_light_residuals(const GroupedLights& image,
   const FrameObservations frame = make_frame(image, assigned, lamps, lens, tolerance.sd_fraction);
   if (frame.size < kMinLights) return squares;
   BodyPrior prior;
-  prior.set_sd(kBodyRoll, kLeanSd_rad);
+  prior.set_state_sd(kBodyRoll, kLeanSd_rad);
   FrameObservations agreeing = frame;
   const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
-  const auto found = estimate_robust(agreeing, {no_arm_m, prior}, tolerance.max_residual_fraction);
+  const auto found =
+      estimate_pose_robustly(agreeing, {no_arm_m, prior}, tolerance.max_residual_fraction);
   if (!has_pose(found.status) || agreeing.size < std::min(frame.size, kMinMajority)) return squares;
   const auto& [roll_rad, pitch_rad] = found.fix.state.motion.inclination;
   const double lean_square = (roll_rad * roll_rad + pitch_rad * pitch_rad) /

@@ -39,7 +39,7 @@ struct GroupedLights {
 ///                has three lights
 ///
 /// In each image the pose of a camera below the lamps is fitted to the lights with a lamp; its roll
-/// and pitch have a prior of 0.15 rad (sd). estimate_robust() rejects a minority of
+/// and pitch have a prior of 0.15 rad (sd). estimate_pose_robustly() rejects a minority of
 /// wrong lights if four agree, and rejects a mirrored map. The squared residual of a light is
 ///
 ///     r^2 = |pixel - predicted pixel|^2 / sd^2 + (lean / 0.15 rad)^2 / lights,

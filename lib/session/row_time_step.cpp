@@ -126,7 +126,7 @@ DetectedLights detect_in_folders(const std::vector<fs::path>& folders, const Lam
   Observations remarks;
   lights.camera.readout = estimate_readout(images, readout, options, imager_px, remarks);
   const LampIntake intake(LightDetector(lamps, lights.camera), ImageUse::fixes, options, imager_px);
-  lights.observations = intake.detect_in_all(images, progress);
+  lights.observations = intake.detect_lamps_in_images(images, progress);
   prepend_messages(remarks, lights.observations);
   check_any_readable(folders.front(), lights.observations.images);
   return lights;

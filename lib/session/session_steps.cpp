@@ -137,7 +137,8 @@ StepWork estimate_lens(SessionState& state, const SessionStepPlan& step,
   LensResult lens = run_lens_step(std::move(input),
                                   make_session_entry(state, format_camera_options(state.options),
                                                      {state.session.board_file(), step.captures}));
-  if (lens.lens.choice) lens.notes.push_back("lens model: " + describe_choice(*lens.lens.choice));
+  if (lens.lens.choice)
+    lens.notes.push_back("lens model: " + describe_lens_choice(*lens.lens.choice));
   return {lens, [&state, lens] {
             if (!can_mrcal_solve(lens.calibration.camera.lens_model)) return;
             write_cameramodel(state.output_file("lens.cameramodel"), lens.lens.solution,

@@ -66,7 +66,7 @@ bool has_kept_examples(const LampClassifier& classifier, TrainStepResult& result
 
 void warn_about_inseparable(const LampClassifier& classifier, TrainStepResult& result) {
   constexpr std::size_t max_lines = 10;
-  const auto pairs = list_inseparable(classifier);
+  const auto pairs = list_inseparable_lamps(classifier);
   for (std::size_t i = 0; i < std::min(pairs.size(), max_lines); ++i) {
     // [LAMP-11] `look alike`
     result.warnings.push_back(

@@ -139,7 +139,7 @@ BoardWarp::BoardWarp(const SceneBoard& board)
     : inverse_half_field_per_m_(2 / compute_tag_field_size_m(board.pattern).array()),
       warp_m_(board.warp_m) {}
 
-BoardWarp::Depth BoardWarp::deflect(const Eigen::Vector2d& at_m) const {
+BoardWarp::Depth BoardWarp::compute_deflection(const Eigen::Vector2d& at_m) const {
   Depth warp{0, {0, 0}};
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const double fraction = at_m[axis] * inverse_half_field_per_m_[axis] - 1;
@@ -179,7 +179,7 @@ Eigen::Vector2d BoardPattern::intersect(const Eigen::Vector3d& origin,
   constexpr double tolerance_m = 1e-9;
   double distance = -origin.z() / direction.z();
   for (int step = 0; step < 8; ++step) {
-    const auto [depth_m, slope] = warp_.deflect(at_m);
+    const auto [depth_m, slope] = warp_.compute_deflection(at_m);
     const double missed_m = origin.z() + distance * direction.z() - depth_m;
     if (!(std::abs(missed_m) > tolerance_m)) break;
     distance -= missed_m / (direction.z() - slope.dot(direction.head<2>()));

@@ -63,7 +63,7 @@ class BoardWarp {
     Eigen::Vector2d slope;
   };
   /// Returns the deflection at a point (x, y) of the board, m.
-  Depth deflect(const Eigen::Vector2d& at_m) const;
+  Depth compute_deflection(const Eigen::Vector2d& at_m) const;
   /// Returns (x, y) of the intersection of a ray with the warped board, in the board frame;
   /// std::nullopt if it does not meet the board in its direction, or beside the paper.
   std::optional<Eigen::Vector2d> intersect_parabola(const Eigen::Vector3d& origin,

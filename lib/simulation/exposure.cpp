@@ -97,7 +97,8 @@ double apply_tone_curve(const ImageProcessing& processing, const Sensor& sensor,
   return white * std::pow(fraction, 1 / processing.gamma);
 }
 
-void process_levels(const ImageProcessing& processing, const Sensor& sensor, cv::Mat1f& levels) {
+void process_gray_levels(const ImageProcessing& processing, const Sensor& sensor,
+                         cv::Mat1f& levels) {
   for (float& level : levels) {
     level = static_cast<float>(apply_tone_curve(processing, sensor, double(level)));
   }
@@ -148,7 +149,7 @@ cv::Mat simulate_sensor_image(const Sensor& sensor, const cv::Mat1f& mean_electr
   cv::Mat1f levels;
   electrons.convertTo(levels, CV_32F, sensor.gain_dn_per_e, sensor.black_level_dn);
   if (!processing->bayer) {
-    process_levels(*processing, sensor, levels);
+    process_gray_levels(*processing, sensor, levels);
     levels.convertTo(image, type);
     return image;
   }
@@ -156,7 +157,7 @@ cv::Mat simulate_sensor_image(const Sensor& sensor, const cv::Mat1f& mean_electr
   for (float& level : levels)
     level = std::clamp(std::round(level), 0.F, float(white_level_dn(sensor)));
   auto colors = demosaic(*processing->bayer, sensor, levels);
-  for (cv::Mat1f& color : colors) process_levels(*processing, sensor, color);
+  for (cv::Mat1f& color : colors) process_gray_levels(*processing, sensor, color);
   cv::Mat color_image;
   cv::merge(colors, color_image);
   color_image.convertTo(image, type);

@@ -30,7 +30,8 @@ double apply_tone_curve(const ImageProcessing& processing, const Sensor& sensor,
 
 /// Applies tone curve and sharpening of ImageProcessing to gray levels before rounding. Border
 /// pixels are replicated.
-void process_levels(const ImageProcessing& processing, const Sensor& sensor, cv::Mat1f& levels);
+void process_gray_levels(const ImageProcessing& processing, const Sensor& sensor,
+                         cv::Mat1f& levels);
 
 /// Returns the file name extension of the images: ".jpg" or ".png".
 std::string image_extension(const std::optional<ImageProcessing>& processing);

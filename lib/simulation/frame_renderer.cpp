@@ -140,7 +140,7 @@ class LampFrame {
     transmittance_ = transmittance_.mul(mirror->reflectance * render_coverage(mirror->pane));
     pane_window_ = compute_moving_window(list_outline_points(mirror->pane), motion_, part_, rays_);
     mirror_ = mirror;
-    reflection_ = make_reflection(mirror->pane);
+    reflection_ = make_reflection_transform(mirror->pane);
   }
 
   /// Returns the light of all sources that are always on.
@@ -266,7 +266,7 @@ class LampFrame {
   /// Draws a glow. `target` is the window's part of an image.
   void render_light(const Glow& glow, const PixelWindow& window, cv::Mat1f target) const {
     if (!get_lamp_shape_traits(glow.shape.kind).is_round) {
-      const Panel panel = make_panel(glow);
+      const Panel panel = make_bounding_panel(glow);
       if (glow.rim_to_center_ratio == 1)
         return render_light(panel, glow.electron_rate_e_per_s, window, target);
       cv::Mat1f patch = window.make_constant_image(0);

@@ -58,7 +58,7 @@ PixelWindow intersect_windows(const PixelWindow& a, const PixelWindow& b) {
           std::max(a.place_begin, b.place_begin), std::min(a.place_end, b.place_end)};
 }
 
-Panel make_panel(const Glow& glow) {
+Panel make_bounding_panel(const Glow& glow) {
   const auto at = [&](double x, double y) {
     return transform_shape_point_to_world(glow.shape, glow.position_m, {x, y});
   };

@@ -45,7 +45,7 @@ PixelWindow compute_moving_window(const std::vector<Eigen::Vector3d>& outline_m,
 PixelWindow intersect_windows(const PixelWindow& a, const PixelWindow& b);
 
 /// Returns the box around a glow.
-Panel make_panel(const Glow& glow);
+Panel make_bounding_panel(const Glow& glow);
 
 /// Returns points around the light of a glow (its rim, or the end of its halo), or along the edges
 /// of a panel.

@@ -131,7 +131,7 @@ void draw_random_parts(Scene& scene) {
   }
 }
 
-Eigen::Isometry3d make_reflection(const Panel& pane) {
+Eigen::Isometry3d make_reflection_transform(const Panel& pane) {
   const Eigen::Vector3d normal = compute_normal(pane);
   Eigen::Isometry3d reflection;
   reflection.linear() = Eigen::Matrix3d::Identity() - 2 * normal * normal.transpose();

@@ -449,7 +449,7 @@ void draw_random_parts(Scene& scene);
 /// Returns the reflection about a panel's plane, in the world:
 ///   p -> p - 2 n n'(p - corner), with the unit normal n.
 /// It is its own inverse; its linear part has the determinant -1.
-Eigen::Isometry3d make_reflection(const Panel& pane);
+Eigen::Isometry3d make_reflection_transform(const Panel& pane);
 
 /// Returns true if light and eye are on one side of the mirror's plane, so that the mirror may show
 /// the light.

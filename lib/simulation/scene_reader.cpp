@@ -34,7 +34,7 @@ static void describe_scene_camera(YamlMap& io, Camera& camera) {
   describe(io, camera);
   for (const char* key : {"row_time_s", "readout"}) io.require(key);
   const YamlField intrinsics(io.require("intrinsics"));
-  for (const std::size_t focal : {0U, 1U}) intrinsics.item(focal).check_within({1, 1e6, "px"});
+  for (const std::size_t focal : {0U, 1U}) intrinsics.item(focal).check_range({1, 1e6, "px"});
   std::vector<int> imager_px;
   constexpr double max_px = 64e6;
   io.required("imager_px", imager_px, Range{8, 20000})

@@ -28,7 +28,10 @@ Eigen::Matrix<double, 2, 4> to_matrix(const std::array<Eigen::Vector2d, 4>& corn
 /// it ends.
 struct CellTraversal {
   CellTraversal(const EdgeCoordinates& all, double from, double displacement)
-      : lines(all.coordinates_m()), start(from), length(displacement), cell(all.locate_cell(from)) {
+      : lines(all.coordinates_m()),
+        start(from),
+        length(displacement),
+        cell(all.count_lines_up_to(from)) {
     if (displacement < 0 && cell > 0 && lines[std::size_t(cell) - 1] == from) --cell;  // downwards
   }
   double end() const {
@@ -57,19 +60,19 @@ EdgeCoordinates::EdgeCoordinates(std::vector<double> lines_m) : lines_m_(std::mo
       static_cast<double>(lines_before_.size()) / (lines_m_.back() - lines_m_.front());
   for (std::size_t i = 0; i < lines_before_.size(); ++i) {
     lines_before_[i] = static_cast<int>(std::ranges::count_if(
-        lines_m_, [&](double line_m) { return locate_interval(line_m) < i; }));
+        lines_m_, [&](double line_m) { return look_up_interval(line_m) < i; }));
   }
 }
 
-std::size_t EdgeCoordinates::locate_interval(double at_m) const {
+std::size_t EdgeCoordinates::look_up_interval(double at_m) const {
   const double last = static_cast<double>(lines_before_.size()) - 1;
   return static_cast<std::size_t>(
       std::clamp((at_m - lines_m_.front()) * intervals_per_m_, 0.0, last));
 }
 
-int EdgeCoordinates::locate_cell(double at_m) const {
+int EdgeCoordinates::count_lines_up_to(double at_m) const {
   std::size_t cell =
-      lines_before_.empty() ? 0 : static_cast<std::size_t>(lines_before_[locate_interval(at_m)]);
+      lines_before_.empty() ? 0 : static_cast<std::size_t>(lines_before_[look_up_interval(at_m)]);
   while (cell < lines_m_.size() && lines_m_[cell] <= at_m) ++cell;
   return static_cast<int>(cell);
 }
@@ -142,8 +145,8 @@ std::optional<double> RectanglePattern::find_uniform_value(
   const auto points = to_matrix(corners);
   if (!points.allFinite()) return std::nullopt;
   const Eigen::Vector2d lower = points.rowwise().minCoeff(), upper = points.rowwise().maxCoeff();
-  const int left = x_.locate_cell(lower.x()), right = x_.locate_cell(upper.x());
-  const int top = y_.locate_cell(lower.y()), bottom = y_.locate_cell(upper.y());
+  const int left = x_.count_lines_up_to(lower.x()), right = x_.count_lines_up_to(upper.x());
+  const int top = y_.count_lines_up_to(lower.y()), bottom = y_.count_lines_up_to(upper.y());
   const double value = values_[flat_cell_index(left, top)];
   for (int row = top; row <= bottom; ++row) {
     const auto cell = values_.begin() + static_cast<std::ptrdiff_t>(flat_cell_index(left, row));

@@ -26,12 +26,12 @@ class EdgeCoordinates {
 
   const std::vector<double>& coordinates_m() const { return lines_m_; }
   /// Returns the number of lines at or below a coordinate: 0 before the first.
-  int locate_cell(double at_m) const;
+  int count_lines_up_to(double at_m) const;
 
  private:
   /// Returns the index in the table of the equal interval that contains a coordinate; of the first
   /// or the last one outside them.
-  std::size_t locate_interval(double at_m) const;
+  std::size_t look_up_interval(double at_m) const;
 
   std::vector<double> lines_m_;
   double intervals_per_m_ = 0;

@@ -105,7 +105,7 @@ double compute_visible_fraction(const Scene& scene, const FrameRenderer& rendere
                                 const Shutter& shutter, const Motion& camera_from_world,
                                 const Glow& glow, const Mirror* mirror) {
   Eigen::Isometry3d reflection = Eigen::Isometry3d::Identity();
-  if (mirror) reflection = make_reflection(mirror->pane);
+  if (mirror) reflection = make_reflection_transform(mirror->pane);
   const auto visible = [&](const Eigen::Vector3d& glow_point_m) {
     const Eigen::Vector3d point_m = reflection * glow_point_m;
     const auto at = find_image_point(renderer, shutter, camera_from_world, point_m);
@@ -137,7 +137,7 @@ std::optional<GlowImage> find_glow_image(const Scene& scene, const FrameRenderer
   if (mirror) {
     const Eigen::Vector3d eye_m = shot.motion.world_from_camera(0).translation();
     if (!are_on_same_side(*mirror, center_m, eye_m)) return std::nullopt;
-    center_m = make_reflection(mirror->pane) * center_m;
+    center_m = make_reflection_transform(mirror->pane) * center_m;
   }
   const Shutter shutter = renderer.make_rolling_shutter(shot.exposure_s);
   const auto center = find_image_point(renderer, shutter, camera_from_world, center_m);
@@ -292,7 +292,7 @@ std::vector<TrueCorner> list_true_corners(const Scene& scene, const FrameRendere
   const auto camera_from_board = [&](double time_s) { return shot.camera_from_board(time_s); };
   std::vector<TrueCorner> corners;
   const auto add = [&](std::optional<int> tag, int corner, const Eigen::Vector2d& at_m) {
-    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), warp.deflect(at_m).depth_m);
+    const Eigen::Vector3d point_m(at_m.x(), at_m.y(), warp.compute_deflection(at_m).depth_m);
     const auto at = find_image_point(renderer, renderer.make_rolling_shutter(shot.exposure_s),
                                      camera_from_board, point_m);
     if (at && is_in_image(scene.camera, at->pixel)) corners.push_back({tag, corner, at->pixel});

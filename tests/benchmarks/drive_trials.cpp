@@ -265,9 +265,10 @@ class Trials {
     for (const DrivenCapture& seen : captures) {
       const KnownMotion known = KnownMotion::make_motion_prior_from_limits(2.5, rad_from_deg(180));
       BodyPrior prior;
-      prior.set_sd(kBodyVelocity, odometry ? 0.01 * seen.speed_m_per_s : known.velocity_sd_m_per_s);
-      prior.set_sd(kBodyYawRate,
-                   odometry ? 0.01 * seen.turn_rate_rad_per_s : known.yaw_rate_sd_rad_per_s);
+      prior.set_state_sd(kBodyVelocity,
+                         odometry ? 0.01 * seen.speed_m_per_s : known.velocity_sd_m_per_s);
+      prior.set_state_sd(kBodyYawRate,
+                         odometry ? 0.01 * seen.turn_rate_rad_per_s : known.yaw_rate_sd_rad_per_s);
       const auto limit = compute_pose_crlb(seen.lamps_m, lens, camera_from_level, seen.pose,
                                            noise_px, prior, clock);
       if (!limit) continue;

@@ -47,7 +47,7 @@ bool try_subsets(const std::vector<BoardView>& views, const Board& board, int se
     fmt::print("all views: no lens: {}\n", all.problem);
     return false;
   }
-  fmt::print("all {} views: {}\n", views.size(), describe_choice(*all.choice));
+  fmt::print("all {} views: {}\n", views.size(), describe_lens_choice(*all.choice));
   std::map<std::string, int> selected;
   std::vector<double> errors_px, ratios;
   int inconsistent = 0;

@@ -72,8 +72,8 @@ TEST(ComputeFloorLimits, TotalVarianceIncreasesWhenMotionAndTiltAreEstimated) {
   camera.row_time_s = 3e-5;
   camera.readout = Readout::rows;
   BodyPrior prior;
-  prior.set_sd(kBodyVelocity, 1);
-  prior.set_sd(kBodyRoll, 2);
+  prior.set_state_sd(kBodyVelocity, 1);
+  prior.set_state_sd(kBodyRoll, 2);
   const FloorGrid grid{-1.5, 1.5, -0.3, 0.3, 0.3};
   const auto standing = compute_floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise);
   const auto limits = compute_floor_limits(synthetic_lamps(), camera, grid, 0.2, 0, kNoise, prior);

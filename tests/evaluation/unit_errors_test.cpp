@@ -98,9 +98,9 @@ TEST_P(UnitErrorsParts, BudgetTermsSumToFixCovarianceWithUnknownMotion) {
   ASSERT_TRUE(fix.has_succeeded());
   ASSERT_EQ(fix.lamps, 8);
   BodyPrior prior;
-  prior.set_sd(kBodyVelocity, 1);
-  prior.set_sd(kBodyYawRate, 0.5);
-  prior.set_sd(kBodyRoll, 0.1);
+  prior.set_state_sd(kBodyVelocity, 1);
+  prior.set_state_sd(kBodyYawRate, 0.5);
+  prior.set_state_sd(kBodyRoll, 0.1);
   const auto budget = UnitErrors(rig.map, rig.calibration)
                           .compute_budget(rig.camera, all_lamps(), kNoise_px, prior);
   ASSERT_TRUE(budget);
@@ -278,7 +278,7 @@ TEST(UnitErrors, BudgetIsNulloptUnlessThereAre2To256Lamps) {
   rig.calibration.camera.row_time_s = 55e-6;
   rig.calibration.camera.readout = Readout::rows;
   BodyPrior prior;
-  prior.set_sd(kBodyVelocity, 1);
+  prior.set_state_sd(kBodyVelocity, 1);
   const UnitErrors unit(rig.map, rig.calibration);
   std::vector<std::size_t> lamps(300);
   std::iota(lamps.begin(), lamps.end(), 0U);

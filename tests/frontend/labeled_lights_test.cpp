@@ -14,7 +14,9 @@ const std::string kSample = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample"
 
 std::vector<Observation> sample_lights() {
   const LightDetector detector({}, {Readout::rows, {}, {}});
-  return LampIntake(detector, ImageUse::fixes, {}, {}).detect_in_all(list_images(kSample)).images;
+  return LampIntake(detector, ImageUse::fixes, {}, {})
+      .detect_lamps_in_images(list_images(kSample))
+      .images;
 }
 
 TEST(AddLabeledLights, AddsOneLightPerLabelOfTable) {

@@ -70,9 +70,9 @@ TEST_F(LampIntakeOfImage, RejectsImageOfOtherSize) {
 TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
   const Observation image = observe(read_image(kRig + "/sample/0000.png"));
   EXPECT_TRUE(image.is_image_kept());
-  EXPECT_GE(list_identified(image).size(), 4U);
+  EXPECT_GE(list_identified_lamps(image).size(), 4U);
   EXPECT_EQ(collect_lamp_frames(std::vector{image}).at(0).detections.size(),
-            list_identified(image).size());
+            list_identified_lamps(image).size());
   for (const Light& light : image.lights) EXPECT_TRUE(light.outline.empty());
 }
 
@@ -80,7 +80,7 @@ TEST_F(LampIntakeOfImage, KeepsImageWithLamps) {
 TEST_F(LampIntakeOfImage, KeepsDarkImageWhenUsedForFixes) {
   const Observation image = observe(ceiling(2, 0.5, 2), ImageUse::fixes);
   EXPECT_TRUE(image.is_image_kept());
-  EXPECT_TRUE(list_identified(image).empty());
+  EXPECT_TRUE(list_identified_lamps(image).empty());
 }
 
 TEST(DetectLamps, RejectsRepeatedImagesUnlessUsedForFixes) {

@@ -79,7 +79,7 @@ TEST(WriteLightsTable, WritesOneRowPerLight) {
   EXPECT_THROW(write_lights_table(folder / "no" / "lights.csv", {}), InputError);
 }
 
-TEST(CountRejectedLights, SortsByCountWithFormlessLightsLast) {
+TEST(CountRejectedLights, SortsByCountButListsLightsWithoutOutlineLast) {
   Light lamp = light_of_kind(LightKind::lamp, LightReason::identified);
   lamp.lamp = 4;
   const Light soft = light_of_kind(LightKind::unknown, LightReason::reflection);

@@ -26,7 +26,7 @@ Observation image_of_lamps(const std::string& name, const std::vector<Eigen::Vec
 
 /// Returns the reasons of the images, after a selection; std::nullopt for those that are kept.
 std::vector<std::optional<RejectionReason>> select(std::vector<Observation> images, ImageUse use) {
-  reject_repeated(images, use, {});
+  reject_repeated_images(images, use, {});
   std::vector<std::optional<RejectionReason>> reasons;
   for (const Observation& image : images) {
     reasons.push_back(image.is_image_kept() ? std::nullopt
@@ -38,7 +38,7 @@ std::vector<std::optional<RejectionReason>> select(std::vector<Observation> imag
 using Reasons = std::vector<std::optional<RejectionReason>>;
 const std::vector<Eigen::Vector2d> kPixels{{100, 100}, {400, 120}, {700, 90}, {420, 500}};
 
-TEST(Selection, RejectsCopiesAndSameViewsDependingOnImageUse) {
+TEST(SelectImages, RejectsCopiesAndSameViewsDependingOnImageUse) {
   auto near = kPixels, far = kPixels;
   for (Eigen::Vector2d& pixel : near) pixel.x() += 7.9;  // 1 % of the width is 8 px
   for (Eigen::Vector2d& pixel : far) pixel.x() += 8.1;
@@ -51,7 +51,7 @@ TEST(Selection, RejectsCopiesAndSameViewsDependingOnImageUse) {
   EXPECT_EQ(select(images, ImageUse::fixes), (Reasons{{}, {}, {}, {}}));
 }
 
-TEST(Selection, KeepsViewThatSharesOnlyHalfOfLamps) {
+TEST(SelectImages, KeepsViewThatSharesOnlyHalfOfLamps) {
   auto fewer = kPixels;
   fewer.resize(2);  // half of the lamps
   EXPECT_EQ(select({image_of_lamps("a", kPixels), image_of_lamps("b", fewer)}, ImageUse::rotation),
@@ -62,18 +62,18 @@ TEST(Selection, KeepsViewThatSharesOnlyHalfOfLamps) {
             (Reasons{{}, RejectionReason::same_view}));
 }
 
-TEST(Selection, KeepsCopyOfRejectedImage) {
+TEST(SelectImages, KeepsCopyOfRejectedImage) {
   auto images = std::vector{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
   images[0].reject(RejectionReason::blurred, "blurred");
   EXPECT_EQ(select(images, ImageUse::rotation), (Reasons{RejectionReason::blurred, {}}));
 }
 
-TEST(Selection, KeepsImagesWithoutLamps) {
+TEST(SelectImages, KeepsImagesWithoutLamps) {
   EXPECT_EQ(select({image_of_lamps("a", {}), image_of_lamps("b", {})}, ImageUse::rotation),
             (Reasons{{}, {}}));
 }
 
-TEST(Selection, RejectsCopyOfImageAddedByAddKeptImage) {
+TEST(SelectImages, RejectsCopyOfImageAddedByAddKeptImage) {
   std::vector images{image_of_lamps("a", kPixels), image_of_lamps("b", kPixels)};
   Selection selection(ImageUse::rotation, {});
   selection.add_kept_image(images[0]);

@@ -83,7 +83,7 @@ TEST_F(VideoOfFrames, ReturnsAllFramesWithTimes) {
     EXPECT_EQ(cv::norm(frame->image, frames[std::size_t(i)], cv::NORM_INF), 0);
   }
   EXPECT_FALSE(video.read_next_frame());
-  EXPECT_EQ(video.describe_missing(), "");
+  EXPECT_EQ(video.describe_missing_frames(), "");
 }
 
 TEST_F(VideoOfFrames, SourceReturnsEveryNthFrameBetweenImages) {
@@ -132,7 +132,7 @@ TEST_F(VideoOfFrames, ReadingContinuesAfterDamagedFrames) {
   EXPECT_GT(count, 33U);
   EXPECT_LT(count, 39U);
   EXPECT_NEAR(last_s, 1.95, 1e-9);
-  EXPECT_THAT(video.describe_missing(), HasSubstr(" of its 40 frames can be decoded"));
+  EXPECT_THAT(video.describe_missing_frames(), HasSubstr(" of its 40 frames can be decoded"));
 }
 
 TEST_F(VideoOfFrames, SourceThrowsForInvalidOrWronglySizedVideos) {
@@ -168,7 +168,9 @@ TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   const auto seen = [&](const std::vector<fs::path>& sources, int threads) {
     FrontendOptions options;
     options.threads = threads;
-    return LampIntake(detector, ImageUse::fixes, options, {}).detect_in_all(sources).images;
+    return LampIntake(detector, ImageUse::fixes, options, {})
+        .detect_lamps_in_images(sources)
+        .images;
   };
   const auto of_images = seen(files, 1), of_film = seen({film}, 3);
   ASSERT_EQ(of_images.size(), files.size());
@@ -177,7 +179,7 @@ TEST_F(VideoOfFrames, YieldsSameLampsAsImages) {
   EXPECT_EQ(of_film[1].image_file_name(), "film.avi#000001");
   EXPECT_NEAR(of_film[1].time_s.value(), 0.05, 1e-9);
   for (std::size_t i = 0; i < files.size(); ++i) {
-    const auto one = list_identified(of_images[i]), other = list_identified(of_film[i]);
+    const auto one = list_identified_lamps(of_images[i]), other = list_identified_lamps(of_film[i]);
     EXPECT_EQ(of_film[i].image_file_name(), make_frame_name("film.avi", i));
     ASSERT_EQ(one.size(), other.size());
     EXPECT_GE(one.size(), 4U);

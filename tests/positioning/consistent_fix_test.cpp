@@ -85,7 +85,7 @@ TEST_P(AssumedLevelAtRest, CovarianceCoversErrorsOfTiltedCamera) {
 }
 
 /// Frames of which the residuals do not contradict the noise keep the stated covariance.
-TEST_P(AssumedLevelAtRest, CovarianceFollowsResidualsOfUnderstatedNoise) {
+TEST_P(AssumedLevelAtRest, CovarianceCoversErrorsWhenNoiseIsTenTimesTheGivenOne) {
   EXPECT_LT(locate(0, 0, 10 * kSigma_px).joint(), GetParam() == 4 ? 20 : 2);
 }
 

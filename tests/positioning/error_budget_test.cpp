@@ -67,9 +67,9 @@ class ErrorBudgetWithPrior : public testing::TestWithParam<FreeStates> {
 
   static BodyPrior prior(const FreeStates& may) {
     BodyPrior prior;
-    prior.set_sd(kBodyVelocity, may.drive ? 1 : 0);
-    prior.set_sd(kBodyYawRate, may.turn ? 1.5 : 0);
-    prior.set_sd(kBodyRoll, may.lean ? 0.1 : 0);
+    prior.set_state_sd(kBodyVelocity, may.drive ? 1 : 0);
+    prior.set_state_sd(kBodyYawRate, may.turn ? 1.5 : 0);
+    prior.set_state_sd(kBodyRoll, may.lean ? 0.1 : 0);
     return prior;
   }
   Sensors sensors() const {
@@ -184,8 +184,8 @@ class ErrorBudgetPriorCases : public ErrorBudgetWithPrior {};
 
 TEST_F(ErrorBudgetPriorCases, EqualsBudgetOfStandingCameraWhenPriorIsTight) {
   BodyPrior prior;
-  prior.set_sd(kBodyVelocity, 1e-7);
-  prior.set_sd(kBodyRoll, 1e-7);
+  prior.set_state_sd(kBodyVelocity, 1e-7);
+  prior.set_state_sd(kBodyRoll, 1e-7);
   const auto found = budget(prior);
   const Camera& camera = rig.calibration.camera;
   const auto standing =
@@ -198,7 +198,7 @@ TEST_F(ErrorBudgetPriorCases, EqualsBudgetOfStandingCameraWhenPriorIsTight) {
 
 TEST_F(ErrorBudgetPriorCases, ReturnsNulloptForTwoOrCollinearLampsWithFreeTilt) {
   BodyPrior in_hand;
-  in_hand.set_sd(kBodyRoll, 1.6);
+  in_hand.set_state_sd(kBodyRoll, 1.6);
   rig.map.lamps.resize(2);
   EXPECT_TRUE(budget(prior({true, true, false})));
   EXPECT_FALSE(budget(in_hand));

@@ -56,7 +56,7 @@ TEST_F(FixResult, ProjectionJacobianEqualsDifferences) {
   }
 }
 
-TEST_F(FixResult, DetectionResidualsHaveRmsOfFixAndStateUse) {
+TEST_F(FixResult, DetectionsAreUsedRejectedOrNotInMapAndHaveRmsOfFix) {
   rig.body.motion = {};
   Random random(3);
   auto detections = with_noise(seen_from(rig, 0.1), random);

@@ -72,7 +72,7 @@ TEST_F(CorrelatedPrior, FixCovarianceIsInverseOfSumOfInformation) {
   }
 }
 
-TEST_F(CorrelatedPrior, ErrorsOfFixesAreAsStated) {
+TEST_F(CorrelatedPrior, FixErrorsMatchReportedCovariance) {
   auto exact = seen_from(rig, 0.1);
   exact.resize(2);
   const BodyCovariance root = prior.covariance.llt().matrixL();
@@ -98,7 +98,7 @@ TEST_F(CorrelatedPrior, ErrorsOfFixesAreAsStated) {
   EXPECT_NEAR(sum / draws, 1, 0.06);
 }
 
-TEST_F(CorrelatedPrior, DiagonalEqualsSensorsWithStandardDeviations) {
+TEST_F(CorrelatedPrior, DiagonalPriorEqualsSensorReadingsWithSds) {
   const auto detections = seen_from(rig, 0.1);
   Sensors sensors;
   sensors.inclination = Inclination{0.05, -0.07};
@@ -115,7 +115,7 @@ TEST_F(CorrelatedPrior, DiagonalEqualsSensorsWithStandardDeviations) {
   EXPECT_THAT(fix.covariance, IsNear(expected.covariance, 1e-12));
 }
 
-TEST_F(CorrelatedPrior, LampsBelowCameraGiveSameFixTurnedOver) {
+TEST_F(CorrelatedPrior, LampsBelowCameraGiveSameFixUpsideDown) {
   const auto detections = seen_from(rig, 0.1);
   const Fix above = locate(detections, prior);
   ASSERT_TRUE(above.has_succeeded());
@@ -148,7 +148,7 @@ TEST_F(CorrelatedPrior, ContradictionAlongCorrelatedDirectionIsInconsistent) {
   EXPECT_EQ(locate(detections, prior).status, FixStatus::inconsistent);
 }
 
-TEST_F(CorrelatedPrior, IsRefusedIfInvalidOrBesideOtherReadings) {
+TEST_F(CorrelatedPrior, IsRejectedIfInvalidOrCombinedWithOtherReadings) {
   const auto detections = seen_from(rig, 0.1);
   Sensors sensors;
   sensors.prior = prior;

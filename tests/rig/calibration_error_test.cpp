@@ -50,7 +50,7 @@ TEST(AddOffsetError, AddsErrorTimesFocalLengthToDispersionOffset) {
   EXPECT_EQ(moved.rotation_center->center_px, leaning().rotation_center->center_px);
 }
 
-TEST(AppendParameters, AddsErrorsThroughJacobianAndOwnErrors) {
+TEST(AppendParameters, CovarianceIsPropagatedByJacobianPlusIndependentErrors) {
   JointCovariance joint;
   Eigen::MatrixXd lens(2, 2), jacobian(2, 2);
   lens << 4, 1, 1, 2;

@@ -79,7 +79,7 @@ TEST(ReadYamlFile, RejectsDeviceFile) {
   EXPECT_EQ(refusal(read_lamp_map, "/dev/zero"), "zero: is a pipe or a device, not a file");
 }
 
-TEST(ReadYamlFile, ReportsFileForLampsOfManySmallNodesOrOneHugeScalar) {
+TEST(ReadYamlFile, RejectsLampListOfManySmallNodesOrHugeScalar) {
   for (const std::string piece : {"1,", "[],", "{},", "&a 1,", "a: 1,", "'',", "? ,"}) {
     const std::string list = repeated(piece, 100'000 / piece.size()).append("]");
     EXPECT_THAT(refusal_of_lamps("[" + list), testing::StartsWith("lamps.yaml:2: "));

@@ -20,7 +20,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::Not;
 
-TEST(CollectKnownCaptures, TakesPositionsOfTableElseGivenPosition) {
+TEST(CollectKnownCaptures, UsesGivenPositionForCapturesWithoutOneInTable) {
   const std::vector<Frame> frames{{"both", {}}, {"only x", {}}, {"not in table", {}}};
   CapturesTable table;
   table["both"].x_m = 1;

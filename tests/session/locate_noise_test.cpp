@@ -93,7 +93,7 @@ TEST_P(LocateCameraFromNoisyDetections, ReportedSdsMatchErrorsOfFixes) {
 
 /// The noise part of the sd is that of the true noise, whatever is stated, beside errors of the map
 /// that are several times as large.
-TEST(LocateFromDetections, NoiseSdIsThatOfPixelsBesideErrorsOfMap) {
+TEST(LocateFromDetections, NoiseSdExcludesErrorsOfMap) {
   constexpr double map_sd_m = 0.002;
   for (const double stated_to_true : {0.0, 1 / 1.4, 1.0}) {
     Random random(31);

@@ -70,7 +70,7 @@ TEST_F(LocateFromImages, DetectionsAreThoseOfLibraryIfTiltIsEstimated) {
     const cv::Mat pixels = read_image(image.file);
     const auto found = locate_camera_in_image(positioner, detector, to_image_view(pixels), sensors);
     ASSERT_TRUE(found.fix.has_succeeded());
-    const auto expected = list_identified(image);
+    const auto expected = list_identified_lamps(image);
     ASSERT_EQ(found.detections.size(), expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i)
       EXPECT_EQ(found.detections[i].pixel, expected[i].pixel);

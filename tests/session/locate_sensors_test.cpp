@@ -184,7 +184,7 @@ TEST(LocateFromDetections, WarnsOfDetectionsFarOutsideImage) {
               Contains(HasSubstr("2 detections are far outside the 400 x 300 px of the camera")));
 }
 
-TEST(LocateFromDetections, NotesThatCapturesDoNotTieLampsTogether) {
+TEST(LocateFromDetections, NotesThatNoCaptureConnectsAllLamps) {
   LocateInput input = make_captures_at_rest(2, 0.1);
   input.compute_lamp_offsets = true;
   EXPECT_THAT(locate_from_detections(input).notes, IsEmpty());

@@ -149,7 +149,7 @@ TEST(ComputePositionCosts, SelectsTrueRowTimeWhenLampMoved) {
 }
 
 /// Around a circle each assignment is a turn of the other.
-TEST(ComputePositionCosts, DoesNotDecideForRotationallySymmetricMap) {
+TEST(ComputePositionCosts, NoCandidateIsClearlyBestForSymmetricMap) {
   std::vector<Eigen::Vector3d> circle_m;
   for (int i = 0; i < 6; ++i) {
     const double angle_rad = i * std::numbers::pi / 3;
@@ -174,7 +174,7 @@ TEST(ComputePositionCosts, SelectsTrueRowTimeWhenOtherAssignmentIsMirrored) {
   images.expect_true_row_time(false);
 }
 
-TEST(ComputePositionCosts, DoesNotDecideForMirroredMap) {
+TEST(ComputePositionCosts, NoCandidateIsClearlyBestForMirroredMap) {
   Images images(mixed_rows());
   LampMap room = images.map;
   for (Lamp& lamp : room.lamps) lamp.position_m.y() *= -1;

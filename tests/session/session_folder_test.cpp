@@ -42,7 +42,7 @@ TEST(ReadCapturesWithTruth, NamesLineOfInvalidTable) {
               HasSubstr("captures.csv:3"));
 }
 
-TEST(ReadTruthPositions, ReadsPositionsOfTruthElseOfCapturesTable) {
+TEST(ReadTruthPositions, PrefersTruthTableToCapturesTable) {
   const TemporaryFolder folder;
   folder.file("captures.csv", "image,x_m,y_m\nb.png,3,4\na.png,1,2\nc.png,,\n");
   const auto places = read_truth_positions(folder / "");
@@ -71,7 +71,7 @@ TEST(SessionFolder, ConstructorNamesMissingFileOrFolder) {
   EXPECT_FALSE(known.accuracy_check_folder());
 }
 
-TEST(SessionFolder, FoldersOfDrivesAlongLinesAreThoseWithPositions) {
+TEST(SessionFolder, LineDriveFoldersAreThoseWhoseTablesHavePositions) {
   const TemporaryFolder folder;
   for (const char* name : {"unit/rotation", "unit/line-y", "unit/line-x", "unit/line-z"}) {
     fs::create_directories(folder / name);

@@ -120,7 +120,7 @@ inline ThinSet thin_set(const Thin& thin, bool kalibr, bool shrinks, Random& ran
     }
     if (any) ++place;
   }
-  reject_repeated(input.observations.images, ImageUse::boards, {});
+  reject_repeated_images(input.observations.images, ImageUse::boards, {});
   return {std::move(input), lens};
 }
 

@@ -37,7 +37,8 @@ TEST(BoardPattern, RayMeetsWarpedBoardWhereItWasAimed) {
     const double reach = i % 4 == 0 ? 0.7 : 0.0;
     const Eigen::Vector2d at_m(random.uniform(-reach, 1 + reach) * kFieldSize_m.x(),
                                random.uniform(-reach, 1 + reach) * kFieldSize_m.y());
-    const RayToPoint ray(Eigen::Vector3d(at_m.x(), at_m.y(), warp.deflect(at_m).depth_m), random);
+    const RayToPoint ray(Eigen::Vector3d(at_m.x(), at_m.y(), warp.compute_deflection(at_m).depth_m),
+                         random);
     const Eigen::Vector2d met_m = pattern.intersect(ray.origin_m, ray.direction);
     EXPECT_LT((met_m - at_m).norm(), reach > 0 ? 1e-8 : 1e-14) << at_m.transpose();
   }
@@ -48,16 +49,16 @@ TEST(BoardPattern, RayAwayFromBoardMeetsNothing) {
   EXPECT_FALSE(pattern.intersect({0.1, 0.1, -0.5}, {0.1, 0.05, -1}).allFinite());
 }
 
-TEST(BoardWarp, DeflectionIsStatedOneInMiddleAndZeroAtCorners) {
+TEST(BoardWarp, DeflectionIsGivenWarpInMiddleAndZeroAtCorners) {
   const BoardWarp warp(make_warped_board());
-  EXPECT_NEAR(warp.deflect(kFieldSize_m / 2).depth_m, -0.001, 1e-15);
-  EXPECT_NEAR(warp.deflect({0, 0}).depth_m, 0, 1e-15);
-  const auto [depth_m, slope] = warp.deflect({0.03, 0.15});
+  EXPECT_NEAR(warp.compute_deflection(kFieldSize_m / 2).depth_m, -0.001, 1e-15);
+  EXPECT_NEAR(warp.compute_deflection({0, 0}).depth_m, 0, 1e-15);
+  const auto [depth_m, slope] = warp.compute_deflection({0.03, 0.15});
   constexpr double step_m = 1e-6;
   for (Eigen::Index axis = 0; axis < 2; ++axis) {
     const Eigen::Vector2d moved_m =
         Eigen::Vector2d(0.03, 0.15) + step_m * Eigen::Vector2d::Unit(axis);
-    EXPECT_NEAR((warp.deflect(moved_m).depth_m - depth_m) / step_m, slope[axis], 1e-6);
+    EXPECT_NEAR((warp.compute_deflection(moved_m).depth_m - depth_m) / step_m, slope[axis], 1e-6);
   }
 }
 

@@ -42,11 +42,13 @@ class FrameRendererMirror : public testing::Test {
   Scene scene_ = plain_scene();
 };
 
-TEST(MakeReflection, MovesPointByTwiceItsDistanceFromPanel) {
-  const Eigen::Isometry3d reflection = make_reflection({{0.4, 5, 0}, {0, 2, 0}, {0, 0, 3}, 0});
+TEST(MakeReflectionTransform, MovesPointByTwiceItsDistanceFromPanel) {
+  const Eigen::Isometry3d reflection =
+      make_reflection_transform({{0.4, 5, 0}, {0, 2, 0}, {0, 0, 3}, 0});
   EXPECT_LT((reflection * Eigen::Vector3d(0.1, 2, 3) - Eigen::Vector3d(0.7, 2, 3)).norm(), 1e-12);
   EXPECT_NEAR(reflection.linear().determinant(), -1, 1e-12);
-  const Eigen::Isometry3d slanted = make_reflection({{1, 0, 0}, {-1, 1, 0}, {0, 0, 1}, 0});
+  const Eigen::Isometry3d slanted =
+      make_reflection_transform({{1, 0, 0}, {-1, 1, 0}, {0, 0, 1}, 0});
   EXPECT_LT((slanted * Eigen::Vector3d::Zero() - Eigen::Vector3d(1, 1, 0)).norm(), 1e-12);
 }
 

@@ -99,11 +99,11 @@ TEST(SimulateSensorImage, BayerImageReproducesLinearGradient) {
   }
 }
 
-TEST(ProcessLevels, OvershootAtStepMatchesUnsharpMaskEquation) {
+TEST(ProcessGrayLevels, OvershootAtStepMatchesUnsharpMaskEquation) {
   const double amount = 0.8, radius_px = 1.5, low = 50, high = 100;
   const ImageProcessing picture{1, Sharpening{amount, radius_px}, {}};
   cv::Mat1f levels = step(low, high);
-  process_levels(picture, kSensor, levels);
+  process_gray_levels(picture, kSensor, levels);
   // Next to the edge the blurred image has (1 + g) / 2 of the step, with g the kernel's largest
   // weight.
   double sum = 0;
@@ -122,7 +122,7 @@ TEST(SimulateSensorImage, SharpensAfterToneCurveAndBeforeRounding) {
   const cv::Mat image = simulate_sensor_image(kSensor, step(20, 200), 1, curve_and_sharpening);
   const ImageProcessing sharpening{1, Sharpening{1, 1}, {}};
   cv::Mat1f levels = step(low, high);
-  process_levels(sharpening, kSensor, levels);
+  process_gray_levels(sharpening, kSensor, levels);
   for (const int u : {18, 19, 20, 21}) {
     EXPECT_EQ(image.at<std::uint8_t>(10, u), std::lround(levels(10, u))) << u;
   }

@@ -73,15 +73,15 @@ std::optional<Pose> estimate_rough_pose(const std::vector<LampObservation>& sigh
       if (j == lamps[i]) continue;
       nearest_m = std::min(nearest_m, (lamps_m[j] - sightings[i].lamp_m).head<2>().norm());
     }
-    frame.add_current(sightings[i], static_cast<int>(i), nearest_m);
+    frame.add_current_observation(sightings[i], static_cast<int>(i), nearest_m);
   }
   const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
   const BodyPrior level_at_rest;
   const BodyProblem problem{no_arm_m, level_at_rest};
-  // Before estimate_robust(), which removes lamps from the frame.
-  const BodySolution all = estimate_from_all(frame, problem);
+  // Before estimate_pose_robustly(), which removes lamps from the frame.
+  const BodySolution all = estimate_pose_from_all_lamps(frame, problem);
   if (sightings.size() > 3) {
-    const BodySolution most = estimate_robust(frame, problem, max_residual_fraction);
+    const BodySolution most = estimate_pose_robustly(frame, problem, max_residual_fraction);
     if (most.status == FixStatus::ok) return most.fix.state.pose;
   }
   return all.status == FixStatus::ok ? std::optional(all.fix.state.pose) : std::nullopt;

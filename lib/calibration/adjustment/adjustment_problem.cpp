@@ -272,7 +272,7 @@ AdjustmentResidual AdjustmentProblem::linearize_prior(std::size_t lamp) const {
           {{at, weight * Eigen::Matrix3d::Identity().bottomRows(size)}}};
 }
 
-std::vector<AdjustmentProblem::Term> AdjustmentProblem::make_terms(
+std::vector<AdjustmentProblem::Term> AdjustmentProblem::list_cost_terms(
     const std::optional<Lens>& lens) const {
   std::vector<Term> terms;
   std::vector<bool> capture_used(captures.size());
@@ -361,7 +361,7 @@ bool AdjustmentProblem::solve_adjustment(bool robust) {
   problem_options.evaluation_callback = &lenses;
   ceres::Problem ceres(problem_options);
   auto order = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (const Term& term : make_terms(lenses.lens)) {
+  for (const Term& term : list_cost_terms(lenses.lens)) {
     const auto start = term.linearize();
     if (!start) return false;
     std::vector<double*> blocks;
@@ -475,7 +475,7 @@ AdjustmentProblem::GlobalCovariance AdjustmentProblem::compute_covariance() cons
   Eigen::MatrixXd information = make_weak_prior();
   std::vector<CaptureRows> rows(captures.size());
   const auto lens = this->current_lens();
-  for (const Term& term : make_terms(lens)) {
+  for (const Term& term : list_cost_terms(lens)) {
     auto at = term.linearize();
     if (!at) continue;
     std::erase_if(at->blocks, [&](const auto& part) { return is_block_exact(part.first); });

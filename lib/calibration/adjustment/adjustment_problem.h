@@ -193,7 +193,7 @@ class AdjustmentProblem {
   };
   /// Returns all terms, those of the detections first. They refer to this object and to `lens`, the
   /// lens of the current state.
-  std::vector<Term> make_terms(const std::optional<Lens>& lens) const;
+  std::vector<Term> list_cost_terms(const std::optional<Lens>& lens) const;
   AdjustmentResidual linearize_place(const PositionObservation& place) const;
   AdjustmentResidual linearize_motion(const Capture& capture) const;
   AdjustmentResidual linearize_prior(std::size_t lamp) const;

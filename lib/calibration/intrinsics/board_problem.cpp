@@ -320,7 +320,7 @@ bool solve_board_problem(BoardProblem& problem, SolveOptions solve_options) {
   return true;
 }
 
-bool solve_stage(BoardProblem& problem, SolveOptions solve_options) {
+bool solve_intermediate_stage(BoardProblem& problem, SolveOptions solve_options) {
   solve_options.distortions = solve_options.distortions && has_distortions(problem);
   solve_options.reject_outliers = false;
   if (!is_splined_lens_model(problem.lens_model) && InlierFit(problem).projects_all &&

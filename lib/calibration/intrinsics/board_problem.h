@@ -85,7 +85,7 @@ bool solve_board_problem(BoardProblem& problem, SolveOptions solve_options);
 /// if Ceres fails.
 /// @pre solve_options.core, unless the lens is splined
 /// @return false if the solve fails
-bool solve_stage(BoardProblem& problem, SolveOptions solve_options);
+bool solve_intermediate_stage(BoardProblem& problem, SolveOptions solve_options);
 
 /// Residuals and Jacobian of a problem. State and Jacobian are packed: the state is divided by
 /// `scale`, so that its entries have similar magnitudes.

@@ -231,7 +231,7 @@ bool IntrinsicsSolver::solve_from_focal(double focal_px) {
     initialize_poses(lens);
     if (used_.size() < kMinViews) return false;
     set_up_problem(lens);
-    if (!solve_stage(problem_, {.core = true})) return false;
+    if (!solve_intermediate_stage(problem_, {.core = true})) return false;
     lens = this->current_lens();
     if (std::abs(lens.focal_px().x() / before_px - 1) < convergence) break;
   }
@@ -383,7 +383,7 @@ bool IntrinsicsSolver::apply_curvature() {
   for (auto& view : input_.views) max_px = std::max(max_px, correct_curvature(view, lens));
   if (max_px < tolerance_px) return true;
   copy_corners();
-  return solve_stage(problem_, solved_parameters_);
+  return solve_intermediate_stage(problem_, solved_parameters_);
 }
 
 bool IntrinsicsSolver::apply_displacements(DisplacementForm form) {
@@ -402,7 +402,7 @@ bool IntrinsicsSolver::apply_displacements(DisplacementForm form) {
       edge_displacements_px_[view] += correct_displacement(input_.views[view], shifts[view]);
     }
     copy_corners();
-    if (!solve_stage(problem_, solved_parameters_)) return false;
+    if (!solve_intermediate_stage(problem_, solved_parameters_)) return false;
   }
   return true;
 }
@@ -415,7 +415,7 @@ bool IntrinsicsSolver::solve_board_warp() {
   };
   const IntrinsicsSolution flat = make_solution();
   solved_parameters_.warp = true;
-  if (!solve_stage(problem_, solved_parameters_)) return false;
+  if (!solve_intermediate_stage(problem_, solved_parameters_)) return false;
   const IntrinsicsSolution with_warp = make_solution();
   if (input_.warp == WarpChoice::automatic &&
       squares(flat) - squares(with_warp) <= min_reduction * with_warp.rms_px * with_warp.rms_px) {
@@ -447,7 +447,7 @@ bool IntrinsicsSolver::update_weights() {
 }
 
 bool IntrinsicsSolver::reweight_corners() {
-  return !update_weights() || solve_stage(problem_, solved_parameters_);
+  return !update_weights() || solve_intermediate_stage(problem_, solved_parameters_);
 }
 
 bool IntrinsicsSolver::reweight_and_reject() {

@@ -90,7 +90,7 @@ struct IntrinsicsSolution {
 /// 9. Splined lenses: aligns the frame to the axis of the lens.
 ///
 /// Stages 3, 8 and 9 call solve_board_problem(). Other solves call the faster
-/// solve_stage(); stage 8 refines their result.
+/// solve_intermediate_stage(); stage 8 refines their result.
 ///
 /// Splined lenses start stage 3 from OPENCV_FISHEYE, whose center becomes their center. Their
 /// regularization is scaled to the residual noise instead of 1 px, which would bias the lens by

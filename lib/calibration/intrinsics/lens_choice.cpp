@@ -50,7 +50,7 @@ std::optional<IntrinsicsSolution> fit_model_to_corners(const IntrinsicsSolution&
       return {};  // no lens of the model is similar
     }
   }
-  if (!solve_stage(fit.problem, fit.solved_parameters)) return {};
+  if (!solve_intermediate_stage(fit.problem, fit.solved_parameters)) return {};
   fit.update_statistics();
   return fit;
 }
@@ -198,7 +198,7 @@ std::optional<LensChoice> select_lens_model(const InitialSolutions& initial) {
   return compare_lens_models(reference);
 }
 
-std::string describe_choice(const LensChoice& choice) {
+std::string describe_lens_choice(const LensChoice& choice) {
   std::string selected, others;
   for (const LensCandidate& candidate : choice.candidates) {
     std::string figures(lens_model_name(candidate.model));

@@ -108,6 +108,6 @@ std::optional<LensChoice> compare_lens_models(const IntrinsicsSolution& referenc
 std::optional<LensChoice> select_lens_model(const InitialSolutions& initial);
 
 /// Describes the candidates with the figures that were compared, the selected one first.
-std::string describe_choice(const LensChoice& choice);
+std::string describe_lens_choice(const LensChoice& choice);
 
 }  // namespace vlp

@@ -233,7 +233,7 @@ std::vector<IntrinsicsSolution> fit_other_models(bool may_be_fisheye, LensEstima
   const auto fisheye =
       std::ranges::find(comparison->candidates, LensModel::fisheye, &LensCandidate::model);
   if (may_be_fisheye && fisheye->fit) recommend_fisheye(*fisheye->fit, result);
-  return list_possible_fits(solution, *comparison);
+  return list_plausible_model_fits(solution, *comparison);
 }
 
 /// Returns the region in which the lens is calibrated and each of the other models has rays.

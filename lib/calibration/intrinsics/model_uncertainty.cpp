@@ -94,8 +94,8 @@ Eigen::VectorXd compute_weights(const std::vector<ModelDifference>& differences)
 
 }  // namespace
 
-std::vector<IntrinsicsSolution> list_possible_fits(const IntrinsicsSolution& solution,
-                                                   const LensChoice& comparison) {
+std::vector<IntrinsicsSolution> list_plausible_model_fits(const IntrinsicsSolution& solution,
+                                                          const LensChoice& comparison) {
   const LensModel model = solution.problem.lens_model;
   const auto own = std::ranges::find(comparison.candidates, model, &LensCandidate::model);
   const double own_excess = own == comparison.candidates.end() ? 0 : own->excess;

@@ -29,8 +29,8 @@ struct ModelUncertainty {
 /// cross-validation does not reject. If it rejects the model of the lens, all models that fit
 /// better count, too.
 /// @param comparison  compare_lens_models() of the solution
-std::vector<IntrinsicsSolution> list_possible_fits(const IntrinsicsSolution& solution,
-                                                   const LensChoice& comparison);
+std::vector<IntrinsicsSolution> list_plausible_model_fits(const IntrinsicsSolution& solution,
+                                                          const LensChoice& comparison);
 
 /// Computes the uncertainty of a lens from the choice of its model: its differences to the fits of
 /// the other models. With the solution c, another model m, and pixels v of the region,
@@ -55,7 +55,7 @@ std::vector<IntrinsicsSolution> list_possible_fits(const IntrinsicsSolution& sol
 /// All models that are not rejected count alike. Weights exp(elpd) would take millions of corners
 /// with common errors for independent and prefer one model for a hundredth of the residual.
 ///
-/// @param others    list_possible_fits()
+/// @param others    list_plausible_model_fits()
 /// @param region    CalibrationReport::region, where each of these lenses has rays
 /// @param noise_px  CalibrationReport::uncertainty_worst_px
 /// @return std::nullopt if noise explains all differences

@@ -53,7 +53,7 @@ class CornerTable {
       from = end + 1;
     }
     if (rows.empty()) throw InputError(file, "contains no corner");
-    if (are_too_many_outside(num_outside_, num_seen_)) throw InputError(*first_outside_);
+    if (are_too_many_corners_outside(num_outside_, num_seen_)) throw InputError(*first_outside_);
   }
 
   InputError error(std::size_t line, const std::string& problem) const {
@@ -82,7 +82,7 @@ class CornerTable {
     if (words.size() == 4) row.weight = parse_weight(line, fourth);
     if (x && y && *x >= 0 && *y >= 0 && row.weight > 0) {
       row.pixel = {*x, *y};
-      const std::string outside = describe_outside(*row.pixel, imager_px_);
+      const std::string outside = describe_corner_outside(*row.pixel, imager_px_);
       ++num_seen_;
       if (!outside.empty() && num_outside_++ == 0) first_outside_ = error(line, outside);
     }

@@ -105,9 +105,9 @@ double correct_tone_curve(std::vector<BoardView>& views, const Board& board) {
   const bool has_no_curve = 2 * std::ranges::count_if(views, may_have_tone_curve) <=
                             std::ranges::count_if(views, has_gray_level_costs);
   if (has_no_curve || !check_board_layout(board, views, {}).problem.empty())
-    return correct_views(views, level_costs);
+    return correct_views_for_tone_curve(views, level_costs);
   const auto ratios = compare_gammas(views, board);
-  if (!ratios) return correct_views(views, level_costs);
+  if (!ratios) return correct_views_for_tone_curve(views, level_costs);
   const double levels_gamma = estimate_gamma(level_costs);
   const double n = residuals / *std::ranges::min_element(*ratios);
   ValuesPerGamma costs{};
@@ -115,7 +115,7 @@ double correct_tone_curve(std::vector<BoardView>& views, const Board& board) {
     const double off = std::log(kGammas[i] / levels_gamma) / levels_sd;
     costs[i] = n * std::log((*ratios)[i]) + off * off / 2;
   }
-  return correct_views(views, costs);
+  return correct_views_for_tone_curve(views, costs);
 }
 
 }  // namespace vlp

@@ -119,7 +119,7 @@ BoardDetection BoardDetector::detect_board(const cv::Mat& image) const {
     seen.curve_costs = refine_tags(once, levels, *print_);
     seen.tags = once;
   } else {
-    auto [tags, rejected_predictions] = touching_->complete_tags(once, gray);
+    auto [tags, rejected_predictions] = touching_->refine_and_complete_tags(once, gray);
     seen.tags = std::move(tags);
     std::erase_if(seen.tags, [&](const TagDetection& tag) {
       return found.contains(tag.id) && found.at(tag.id).size() > 1;

@@ -70,7 +70,7 @@ struct TagDetection {
   Corners corners_px;
   Curvatures curvatures = {};
   CornerSds corner_sds_px = {};
-  /// Fits for the tone curves of kGammas above 1, one each, until correct_views()
+  /// Fits for the tone curves of kGammas above 1, one each, until correct_views_for_tone_curve()
   /// applies a curve. Empty for an image that certainly has no tone curve.
   std::vector<Outline> tone_curve_fits = {};
   Steps steps = {};
@@ -112,7 +112,7 @@ struct BoardDetection {
   std::array<int, 2> largest_chessboard_part = {0, 0};
   /// Negative log-likelihood of the edges of tags for the tone curves of kGammas, up to a constant.
   /// Only the first two if the image certainly has no tone curve. Empty if no edges are fitted, or
-  /// after correct_views().
+  /// after correct_views_for_tone_curve().
   std::vector<double> curve_costs = {};
 
   /// Returns true if a tag or a point was detected.

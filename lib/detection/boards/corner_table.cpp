@@ -95,7 +95,8 @@ std::string describe_rows(const Board& board, std::span<const BoardView> views) 
 
 }  // namespace
 
-std::string describe_outside(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px) {
+std::string describe_corner_outside(const Eigen::Vector2d& pixel,
+                                    const std::array<int, 2>& imager_px) {
   constexpr double edge = 0.5;  // half a pixel
   const auto [width, height] = imager_px;
   if (pixel.x() >= -edge && pixel.y() >= -edge && pixel.x() <= width - edge &&
@@ -107,7 +108,7 @@ std::string describe_outside(const Eigen::Vector2d& pixel, const std::array<int,
       format_exact_number(pixel.x()), format_exact_number(pixel.y()), width, height);
 }
 
-bool are_too_many_outside(std::size_t outside, std::size_t corners) {
+bool are_too_many_corners_outside(std::size_t outside, std::size_t corners) {
   constexpr std::size_t one_of = 50;
   return one_of * outside > corners;
 }
@@ -134,7 +135,7 @@ class CornerTableReader {
   std::vector<BoardView> read() {
     for (std::size_t row = 0; row < csv_.num_rows(); ++row) read_row(row);
     if (views_.empty()) throw InputError(file_, "contains no corner");
-    if (are_too_many_outside(outside_, corners_)) throw InputError(*first_outside_);
+    if (are_too_many_corners_outside(outside_, corners_)) throw InputError(*first_outside_);
     return std::move(views_);
   }
 
@@ -151,7 +152,7 @@ class CornerTableReader {
     }
     const Eigen::Vector2d pixel(csv_.get_cell_number(row, u_px_), csv_.get_cell_number(row, v_px_));
     ++corners_;
-    if (const auto words = describe_outside(pixel, imager_px_); !words.empty()) {
+    if (const auto words = describe_corner_outside(pixel, imager_px_); !words.empty()) {
       if (outside_++ == 0) first_outside_ = csv_.make_cell_error(row, u_px_, words);
     }
     const int corner = read_number(row);

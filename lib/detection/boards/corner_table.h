@@ -27,7 +27,7 @@ namespace vlp {
 /// rejected. Tags that the board does not have are BoardDetection::foreign_tags.
 ///
 /// @throws InputError with file and line, also for a repeated corner, and if too many corners are
-///         outside the image (are_too_many_outside())
+///         outside the image (are_too_many_corners_outside())
 std::vector<BoardView> read_corner_table(const std::filesystem::path& file, const Board& board,
                                          const std::array<int, 2>& imager_px);
 
@@ -38,10 +38,11 @@ void write_corner_table(const std::filesystem::path& file, std::span<const Board
                         const Board& board);
 
 /// Describes that a corner is outside the image; empty if it is inside.
-std::string describe_outside(const Eigen::Vector2d& pixel, const std::array<int, 2>& imager_px);
+std::string describe_corner_outside(const Eigen::Vector2d& pixel,
+                                    const std::array<int, 2>& imager_px);
 
 /// Returns true if more than 2 % of the corners are outside the image. Fewer may be outliers; more
 /// indicate an image of another size.
-bool are_too_many_outside(std::size_t outside, std::size_t corners);
+bool are_too_many_corners_outside(std::size_t outside, std::size_t corners);
 
 }  // namespace vlp

@@ -28,8 +28,8 @@ EdgeField::EdgeField(std::span<const EdgeSample> samples, Terms terms) {
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     std::vector<double> residuals, magnitudes, variances;
     for (std::size_t i = 0; i < samples.size(); ++i) {
-      residuals.push_back(
-          logs[i] - make_terms_at_edge(samples[i].at_px, samples[i].along).dot(coefficients_));
+      residuals.push_back(logs[i] -
+                          make_design_row(samples[i].at_px, samples[i].along).dot(coefficients_));
       magnitudes.push_back(std::abs(residuals.back()));
       variances.push_back(samples[i].sd * samples[i].sd);
     }
@@ -46,7 +46,7 @@ EdgeField::EdgeField(std::span<const EdgeSample> samples, Terms terms) {
       const double weight =
           std::min(1.0, huber_threshold / std::max(sigmas, huber_threshold)) / variance;
       const Eigen::VectorXd terms_row =
-          make_terms_at_edge(samples[i].at_px, samples[i].along).head(terms_).transpose();
+          make_design_row(samples[i].at_px, samples[i].along).head(terms_).transpose();
       normal.noalias() += weight * terms_row * terms_row.transpose();
       right += weight * residuals[i] * terms_row;
     }
@@ -57,8 +57,8 @@ EdgeField::EdgeField(std::span<const EdgeSample> samples, Terms terms) {
   }
 }
 
-EdgeField::Row EdgeField::make_terms_at_edge(const Eigen::Vector2d& at_px,
-                                             const Eigen::Vector2d& along) const {
+EdgeField::Row EdgeField::make_design_row(const Eigen::Vector2d& at_px,
+                                          const Eigen::Vector2d& along) const {
   const Eigen::Vector2d x = (at_px - middle_px_) / reach_px_;
   const double square = along.x() * along.x() - along.y() * along.y();
   Row row;
@@ -70,7 +70,7 @@ EdgeField::Row EdgeField::make_terms_at_edge(const Eigen::Vector2d& at_px,
 
 double EdgeField::evaluate_at_edge(const Eigen::Vector2d& at_px,
                                    const Eigen::Vector2d& along) const {
-  return std::exp(make_terms_at_edge(at_px, along).dot(coefficients_));
+  return std::exp(make_design_row(at_px, along).dot(coefficients_));
 }
 
 }  // namespace vlp

@@ -38,7 +38,7 @@ class EdgeField {
  private:
   static constexpr Eigen::Index kMaxTerms = 8;
   using Row = Eigen::Matrix<double, 1, kMaxTerms>;
-  Row make_terms_at_edge(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
+  Row make_design_row(const Eigen::Vector2d& at_px, const Eigen::Vector2d& along) const;
 
   Eigen::Vector2d middle_px_{0, 0};
   double reach_px_ = 1;

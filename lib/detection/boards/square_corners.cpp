@@ -104,8 +104,8 @@ SquareCorners::SquareCorners(const Board& board)
       margin_m_((board.square_size_m - board.tag_size_m) / 2),
       layout_(list_board_tags(board)) {}
 
-std::vector<PointDetection> SquareCorners::refine_guesses(const std::vector<Guess>& guesses,
-                                                          const GrayLevels& image) const {
+std::vector<PointDetection> SquareCorners::refine_corner_guesses(const std::vector<Guess>& guesses,
+                                                                 const GrayLevels& image) const {
   constexpr int min_px = 2, max_px = 5;
   constexpr double edge_px = 2;  // a corner nearer to the image's edge is cut short
   std::vector<PointDetection> points;
@@ -259,7 +259,7 @@ std::vector<PointDetection> SquareCorners::detect_chessboard(const GrayLevels& i
                          std::min((right - here).norm(), (down - here).norm())});
     }
   }
-  auto corners = refine_guesses(guesses, image);
+  auto corners = refine_corner_guesses(guesses, image);
   return is_chessboard_confirmed(corners, cols_, rows_) ? corners : std::vector<PointDetection>();
 }
 
@@ -295,7 +295,7 @@ std::vector<PointDetection> SquareCorners::detect_near_markers(
                          std::sqrt(2) * square_px * margin_m_ / square_size_m_});
     }
   }
-  return refine_guesses(guesses, image);
+  return refine_corner_guesses(guesses, image);
 }
 
 std::array<int, 2> SquareCorners::detect_largest_part(const cv::Mat1b& image) const {
@@ -374,8 +374,8 @@ std::optional<TagDetection> TouchingTags::predict_missing_tag(
   return tag;
 }
 
-TouchingTags::CompletedTags TouchingTags::complete_tags(const std::vector<TagDetection>& rough,
-                                                        const GrayLevels& image) const {
+TouchingTags::CompletedTags TouchingTags::refine_and_complete_tags(
+    const std::vector<TagDetection>& rough, const GrayLevels& image) const {
   CompletedTags result;
   std::set<int> refined_ids;
   const auto refine = [&](const std::optional<TagDetection>& guess) {

@@ -45,8 +45,8 @@ class SquareCorners {
     std::array<Eigen::Vector2d, 2> next;
     double free_px;
   };
-  std::vector<PointDetection> refine_guesses(const std::vector<Guess>& guesses,
-                                             const GrayLevels& image) const;
+  std::vector<PointDetection> refine_corner_guesses(const std::vector<Guess>& guesses,
+                                                    const GrayLevels& image) const;
   /// Finds the corners of a chessboard, accurate to 0.2 px of a reduced image. Empty if no search
   /// finds it.
   std::vector<PointDetection> search_chessboard(const cv::Mat1b& image) const;
@@ -79,8 +79,8 @@ class TouchingTags {
   /// Refines the tags of `rough`, then predicts the others by a homography of the nearest refined
   /// tags. If that fails, the nearest tags of `rough` predict a tag: an overexposed board may have
   /// few tags, and none that can be refined. They may be wrong; refined tags take precedence.
-  CompletedTags complete_tags(const std::vector<TagDetection>& rough,
-                              const GrayLevels& image) const;
+  CompletedTags refine_and_complete_tags(const std::vector<TagDetection>& rough,
+                                         const GrayLevels& image) const;
 
  private:
   std::optional<TagDetection> predict_missing_tag(const BoardTag& missing,

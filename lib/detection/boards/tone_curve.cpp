@@ -76,7 +76,7 @@ ValuesPerGamma sum_tone_curve_costs(const std::vector<BoardView>& views) {
 
 double estimate_gamma(const ValuesPerGamma& costs) { return std::exp(estimate_log_gamma(costs)); }
 
-double correct_views(std::vector<BoardView>& views, const ValuesPerGamma& costs) {
+double correct_views_for_tone_curve(std::vector<BoardView>& views, const ValuesPerGamma& costs) {
   constexpr double min_gamma = 1.2;
   const Parabola parabola = make_parabola(costs);
   const double log_gamma = estimate_log_gamma(costs);

@@ -34,6 +34,6 @@ double estimate_gamma(const ValuesPerGamma& costs);
 /// kGammas, and standard deviations and steps linearly. An image that certainly has no tone curve
 /// keeps its corners. Clears TagDetection::tone_curve_fits and BoardDetection::curve_costs in all
 /// views.
-double correct_views(std::vector<BoardView>& views, const ValuesPerGamma& costs);
+double correct_views_for_tone_curve(std::vector<BoardView>& views, const ValuesPerGamma& costs);
 
 }  // namespace vlp

@@ -105,7 +105,7 @@ bool is_in_one_only(const ErrorPair& pair, const std::vector<FixRow>& fixes,
 
 }  // namespace
 
-std::span<const ComparedQuantity, 5> list_quantities() { return kComparedQuantities; }
+std::span<const ComparedQuantity, 5> list_compared_quantities() { return kComparedQuantities; }
 
 std::string_view QuantityComparison::comparison_verdict() const {
   if (has_too_few_clusters() || !interval) return "inconclusive";

@@ -43,7 +43,7 @@ struct ComparedQuantity {
 
 /// Returns horizontal error, height error, yaw error, horizontal standard deviation, and the RMS of
 /// error / standard deviation over x, y, z and yaw.
-std::span<const ComparedQuantity, 5> list_quantities();
+std::span<const ComparedQuantity, 5> list_compared_quantities();
 
 /// Comparison of one quantity over the captures that have it in both sets of fixes, in SI units.
 struct QuantityComparison {
@@ -79,7 +79,7 @@ struct Comparison {
   /// Number of captures that escape the comparison: with a fix in the second only, with a quantity
   /// in one of both only, or without a row in the second.
   std::size_t unpaired = 0;
-  /// Comparisons in the order of list_quantities(); without pairs if a quantity is
+  /// Comparisons in the order of list_compared_quantities(); without pairs if a quantity is
   /// unknown.
   std::array<QuantityComparison, 5> quantities{};
 

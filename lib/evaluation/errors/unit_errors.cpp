@@ -62,7 +62,7 @@ std::optional<UnitBudget> UnitErrors::compute_budget(const Pose& level,
   if (!limit) return std::nullopt;
   const Eigen::Matrix3d body_from_base = Eigen::Matrix3d::Identity();
   const Eigen::Vector3d no_arm_m = Eigen::Vector3d::Zero();
-  const auto gain = whole_.compute_fix_gain<4>(
+  const auto gain = whole_.differentiate_fix<4>(
       {limit->frame.observations_span(), lamps, lens_, body_from_base, no_arm_m}, limit->fix);
   const auto part = [&](CommonErrorSource of) {
     return parts_[static_cast<std::size_t>(of)].propagate(gain);

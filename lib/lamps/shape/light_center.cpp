@@ -85,8 +85,8 @@ Eigen::Vector2d LightShape::compute_curved_line_offset(
   return off;
 }
 
-void LightShape::correct_light(const Oval& oval, const Eigen::Vector2d& motion_per_line,
-                               MeasuredLight& light) const {
+void LightShape::correct_center_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
+                                           MeasuredLight& light) const {
   const auto estimate = light.outline_equations->solve_with_oval_prior(oval);
   if (!estimate) return;
   const Circle& circle = light.outline_equations->circle;

@@ -40,8 +40,8 @@ class LightShape {
   ///
   /// @param oval             prior of the ovality, relative to the fitted outline, in radii
   /// @param motion_per_line  motion of the light in the level plane per scanline
-  void correct_light(const Oval& oval, const Eigen::Vector2d& motion_per_line,
-                     MeasuredLight& light) const;
+  void correct_center_for_motion(const Oval& oval, const Eigen::Vector2d& motion_per_line,
+                                 MeasuredLight& light) const;
 
   /// Converts (u, v) of the image to (column, line), and back.
   Eigen::Vector2d swap_axes(const Eigen::Vector2d& at) const;

@@ -1148,7 +1148,7 @@ void OutlineFit::add_center_error(double sd_px) {
   gradient *= ratio;
 }
 
-bool KnownRadius::agrees_with(const MeasuredLight& light) const {
+bool KnownRadius::is_radius_of(const MeasuredLight& light) const {
   constexpr double max_sds = 2, max_rim_error = 0.02, max_edge_error = 0.03;
   return std::abs(std::log(light.plane_outline.radius() / radius)) <
          max_sds * log_sd +

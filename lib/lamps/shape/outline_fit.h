@@ -44,7 +44,7 @@ struct KnownRadius {
 
   /// Returns true if a light has this radius, within two standard deviations and the error of its
   /// outline.
-  bool agrees_with(const MeasuredLight& light) const;
+  bool is_radius_of(const MeasuredLight& light) const;
 
   /// Returns true if this prior differs from the radius of a light by more than two standard
   /// deviations, would move its center by more than a tenth of its standard deviation, or would

@@ -55,11 +55,11 @@ std::optional<PlanePatch> PlanePatch::fit(const LightShape& shape, const PixelBo
     values.row(i) = *at;
   }
   patch.coefficients_ = solver * values;
-  patch.degree_ = patch.select_degree();
+  patch.degree_ = patch.select_polynomial_degree();
   return patch;
 }
 
-int PlanePatch::select_degree() const {
+int PlanePatch::select_polynomial_degree() const {
   constexpr double max_error_px = 1e-4;
   // Sums of the terms of each degree: the largest error without them.
   std::array<double, kMaxDegree + 1> sums{};

@@ -43,7 +43,7 @@ class PlanePatch {
   };
 
  private:
-  int select_degree() const;
+  int select_polynomial_degree() const;
 
   Eigen::Vector2d middle_, half_;
   int degree_;

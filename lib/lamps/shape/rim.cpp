@@ -346,7 +346,7 @@ std::optional<MeasuredLight> fit_rim_of_light(const ImageView& image, const Blob
   MeasuredLight light{};
   light.has_bright_core = fit && face.bright_level() > min_core_ratio * fit->level;
   if (!fit || fit->center_sd_px > (radius ? max_known_center_sd : max_center_sd) * fit->radius_px ||
-      !set_fitted_outline(*fit, shape, light) || (radius && !radius->agrees_with(light))) {
+      !set_fitted_outline(*fit, shape, light) || (radius && !radius->is_radius_of(light))) {
     return std::nullopt;
   }
   return light;

@@ -124,7 +124,7 @@ std::optional<int> identify_by_classifier(const LampClassifier& classifier,
   return lamp->lamp;
 }
 
-std::vector<LampDistance> list_inseparable(const LampClassifier& classifier) {
+std::vector<LampDistance> list_inseparable_lamps(const LampClassifier& classifier) {
   constexpr double minimum = 6;
   std::vector<LampDistance> pairs;
   for (std::size_t i = 0; i < classifier.lamps.size(); ++i) {

@@ -95,7 +95,7 @@ struct LampDistance {
 
 /// Returns the pairs of lamps that identify_by_classifier() cannot separate, with a distance
 /// below 6. At distance 6 one light in forty is unknown.
-std::vector<LampDistance> list_inseparable(const LampClassifier& classifier);
+std::vector<LampDistance> list_inseparable_lamps(const LampClassifier& classifier);
 
 /// Confusion matrix of a classifier for lights of known lamps.
 struct ConfusionMatrix {

@@ -60,13 +60,13 @@ void add_readout(CLI::App& app, std::optional<Readout>& readout) {
       ->option_text("rows|columns");
 }
 
-void add_frame_step(CLI::App& app, int& every) {
+void add_every_option(CLI::App& app, int& every) {
   app.add_option("--every", every, "Use every Nth frame of a video (default: 1)")
       ->check(CLI::Range(1, 1000000))
       ->option_text("N");
 }
 
-void check_frame_step(int every, const std::vector<std::string>& files) {
+void check_every_option(int every, const std::vector<std::string>& files) {
   if (every == 1 || std::any_of(files.begin(), files.end(), is_video_file_name)) return;
   throw std::invalid_argument("--every: there is no video; leave it out");
 }

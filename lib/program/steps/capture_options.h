@@ -51,10 +51,10 @@ inline constexpr const char* kAutomaticLens = "auto";
 void add_lens_model(CLI::App& app, std::string& lens);
 
 /// Adds --every, for programs that take videos.
-void add_frame_step(CLI::App& app, int& every);
+void add_every_option(CLI::App& app, int& every);
 
 /// Throws std::invalid_argument if `every` is not 1 and none of the files is a video.
-void check_frame_step(int every, const std::vector<std::string>& files);
+void check_every_option(int every, const std::vector<std::string>& files);
 
 /// Adds --room.
 void add_room_option(CLI::App& app, std::string& room);

@@ -116,7 +116,7 @@ void print_error_ratios(const Evaluation& evaluation) {
 }
 
 void print_comparison(const Comparison& comparison) {
-  for (std::size_t i = 0; const ComparedQuantity& quantity : list_quantities()) {
+  for (std::size_t i = 0; const ComparedQuantity& quantity : list_compared_quantities()) {
     const QuantityComparison& compared = comparison.quantities[i++];
     const double factor = quantity.units_per_si;
     if (compared.pairs == 0 && i > 1) continue;

@@ -86,7 +86,8 @@ struct Blocks {
   std::string arrows, cut, places, missing, lamps;
 
   Blocks(const ErrorPlot& plot, std::size_t step, Scale& scale) {
-    for (const std::size_t i : thin_out(compute_lengths_m(plot), step, step > 1 ? kFurthest : 0)) {
+    for (const std::size_t i :
+         thin_out_indices(compute_lengths_m(plot), step, step > 1 ? kFurthest : 0)) {
       const Eigen::Vector2d& from_m = plot.fixes[i].truth_m;
       const double length_m = error_m(plot.fixes[i]), longest_m = scale.compute_longest_arrow_m();
       Eigen::Vector2d arrow_m = scale.magnification * (plot.fixes[i].fix_m - from_m);

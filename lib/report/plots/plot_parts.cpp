@@ -103,8 +103,8 @@ std::string describe_thinning(std::size_t count, std::size_t step) {
   return "every " + format_ordinal(step) + " of " + std::to_string(count) + " drawn";
 }
 
-std::vector<std::size_t> thin_out(std::span<const double> values, std::size_t step,
-                                  std::size_t largest) {
+std::vector<std::size_t> thin_out_indices(std::span<const double> values, std::size_t step,
+                                          std::size_t largest) {
   std::vector<std::size_t> all(values.size()), chosen;
   std::iota(all.begin(), all.end(), 0);
   for (std::size_t i = 0; i < values.size(); i += step) chosen.push_back(i);

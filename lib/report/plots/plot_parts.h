@@ -75,7 +75,7 @@ std::size_t compute_thinning_step(std::size_t count, std::size_t max_count);
 std::string describe_thinning(std::size_t count, std::size_t step);
 
 /// Returns the ascending indices of every step-th value and of the `largest` largest values.
-std::vector<std::size_t> thin_out(std::span<const double> values, std::size_t step,
-                                  std::size_t largest);
+std::vector<std::size_t> thin_out_indices(std::span<const double> values, std::size_t step,
+                                          std::size_t largest);
 
 }  // namespace vlp

@@ -101,7 +101,7 @@ std::vector<std::string> describe_rotation(const Unit& unit) {
 std::string describe_lamps(const Unit& unit, const UnitStep& step) {
   std::map<int, int> seen;
   for (const UnitImage* image : list_used_images(step)) {
-    for (const Detection& lamp : list_identified(image->observation)) ++seen[lamp.lamp];
+    for (const Detection& lamp : list_identified_lamps(image->observation)) ++seen[lamp.lamp];
   }
   std::string there, missing;
   for (const Lamp& lamp : unit.station_config().lamps.lamps) {

@@ -43,7 +43,8 @@ Observations list_observations(const UnitStep& step) {
 std::vector<Frame> list_used_detections(const UnitStep& step) {
   std::vector<Frame> frames;
   for (const UnitImage* image : list_used_images(step)) {
-    frames.push_back({image->observation.image_file_name(), list_identified(image->observation)});
+    frames.push_back(
+        {image->observation.image_file_name(), list_identified_lamps(image->observation)});
   }
   return frames;
 }

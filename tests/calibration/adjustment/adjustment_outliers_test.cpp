@@ -59,7 +59,7 @@ class RunBundleAdjustmentOutliers : public AdjustmentRoom {
 };
 
 /// The survey of the lamp is as uncertain as its position from the captures.
-TEST_F(RunBundleAdjustmentOutliers, LampIsMovedFromChiSquaredLimitOn) {
+TEST_F(RunBundleAdjustmentOutliers, LampIsReportedAsMovedAboveChiSquaredLimit) {
   constexpr std::size_t lamp = 2;
   input.captures_are_checked = true;
   scale_survey(0.1);
@@ -99,7 +99,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampIsMovedFromChiSquaredLimitOn) {
 
 /// A noise of 0.03 px moves lamps away from their survey if sigma is 0.005 px, and does not if
 /// sigma increases to the noise.
-TEST_F(RunBundleAdjustmentOutliers, LampsAreNotMovedIfIncreasedNoiseExplainsThem) {
+TEST_F(RunBundleAdjustmentOutliers, LampsAreNotReportedAsMovedIfNoiseExplainsThem) {
   scale_survey(0.02);
   measure(0.005, 0.03);
   const Solution expected = solve(1);
@@ -116,7 +116,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsAreNotMovedIfIncreasedNoiseExplainsThem
 
 /// With two wrong lamps among five, the three others agree with the survey. With two among four,
 /// the survey is contradicted, and no lamp is moved.
-TEST_F(RunBundleAdjustmentOutliers, LampsAreMovedOnlyIfMostAgreeWithSurvey) {
+TEST_F(RunBundleAdjustmentOutliers, LampsAreReportedAsMovedOnlyIfMostAgreeWithSurvey) {
   scale_survey(0.3);
   input.captures_are_checked = true;
   input.lamps.lamps[0].position_m = true_lamps_m[0] + Eigen::Vector3d(0.02, -0.01, 0.01);
@@ -143,7 +143,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsAreMovedOnlyIfMostAgreeWithSurvey) {
 
 /// Lamps that are farther than 8 standard deviations from the robust solution are moved, even half
 /// of them.
-TEST_F(RunBundleAdjustmentOutliers, LampsFarFromRobustSolutionAreMovedWithoutMajority) {
+TEST_F(RunBundleAdjustmentOutliers, LampsFarFromRobustFitAreReportedAsMovedWithoutMajority) {
   scale_survey(0.3);
   for (AdjustmentCapture& capture : input.captures) {
     if (capture.known_position) capture.known_position->sd_m *= 0.1;
@@ -177,7 +177,7 @@ TEST_F(RunBundleAdjustmentOutliers, DetectionsOfMisplacedExactLampAreRejected) {
 }
 
 /// A position that seems wrong beside a lamp that has moved by 8 cm.
-TEST_F(RunBundleAdjustmentOutliers, KnownPositionIsUsedAgainWithoutMovedLamp) {
+TEST_F(RunBundleAdjustmentOutliers, KnownPositionIsReinstatedOnceMovedLampIsFound) {
   input.captures_are_checked = true;
   measure(0.0005, 0.03);
   input.lamps.lamps[0].position_m.x() += 0.08;

@@ -96,7 +96,7 @@ TEST_F(RunBundleAdjustmentResult, CountsAndResidualMatchDenseSolution) {
   EXPECT_NEAR(found.lamp_height_m, expected.lamp_height_m, 1e-6);
 }
 
-TEST_F(RunBundleAdjustmentResult, LampsAndSurveyedCovarianceFollowFromEstimates) {
+TEST_F(RunBundleAdjustmentResult, RefinedLampsAndTheirCovarianceEqualEstimates) {
   measure(0.05, 0.03);
   const AdjustmentResult found = adjust();
   ASSERT_EQ(found.lamps.size(), 5U);

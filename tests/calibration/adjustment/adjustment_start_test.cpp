@@ -46,7 +46,7 @@ AdjustmentInput make_input_of_two_lamps(const Eigen::Vector2d& distance_px) {
 
 /// One detection in a corner of the map has the id of a lamp beyond the opposite corner. The pose
 /// from all four lamps is turned by half a turn. The pose of the other three lamps is right.
-TEST(RunBundleAdjustmentStart, IsFitOfThreeLampsIfOneOfFourIsMisidentified) {
+TEST(RunBundleAdjustmentStart, IsFittedToThreeLampsIfOneOfFourIsMisidentified) {
   Survey survey;
   survey.five_places(1e-4);
   survey.input.lamps.lamps.push_back({9, {1.5, 0.9, 1.6}, {}, {}, {}, 0.002});
@@ -64,7 +64,7 @@ TEST(RunBundleAdjustmentStart, IsFitOfThreeLampsIfOneOfFourIsMisidentified) {
 
 /// Map with errors of 5 mm. Only the first captures contain two lamps of equal x and y. Swapped
 /// lamps in opposite corners turn the pose from all lamps of the last capture by half a turn.
-TEST(RunBundleAdjustmentStart, IsFitOfLampsThatAgreeToFractionOfTheirDistances) {
+TEST(RunBundleAdjustmentStart, IsFittedToLampsThatAgreeWithinFractionOfTheirDistances) {
   Survey survey(0.005);
   survey.truth.map.lamps[1].position_m = {0.5, 0.05, 1.7};  // below it, lamp 7 at 1.59 m
   survey.input.lamps = survey.truth.map;

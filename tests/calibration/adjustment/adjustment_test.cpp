@@ -100,7 +100,7 @@ TEST(AdjustBundle, RecoversAllLampsExactlyWhenOneIsMoved) {
                                "scale of the map; captures at 3 more known positions")));
 }
 
-TEST(AdjustBundle, AsksForSecondHeightForOneCaptureOfTwoLampsAndSucceedsWithIt) {
+TEST(AdjustBundle, OneCaptureOfTwoLampsNeedsSecondHeight) {
   Survey survey;
   survey.turn({0, 0, 0}, 1);
   survey.input.captures[0].detections.resize(2);
@@ -112,7 +112,7 @@ TEST(AdjustBundle, AsksForSecondHeightForOneCaptureOfTwoLampsAndSucceedsWithIt) 
   EXPECT_THAT(*found.center.lever_arm_m, IsNear(survey.lever_arm_m, 1e-6));
 }
 
-TEST(AdjustBundle, NotesWhatOneOrTwoKnownPositionsDoNotDetermine) {
+TEST(AdjustBundle, ListsUnknownsUndeterminedByOneOrTwoKnownPositions) {
   Survey survey(0.001);
   survey.turn({0, 0, 0}, 12, 1e-4);
   EXPECT_THAT(adjust_bundle(survey.input).notes,

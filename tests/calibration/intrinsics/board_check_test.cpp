@@ -206,7 +206,7 @@ std::string layout_problem(const Board& stated, const std::vector<BoardView>& vi
   return check_board_layout(stated, views, {}).problem;
 }
 
-TEST(CheckFlatBoardLayout, NamesEveryIdOrder) {
+TEST(CheckFlatBoardLayout, ReportsTrueIdOrderForEachWrongOne) {
   for (const bool column_major : {false, true}) {
     for (const auto from : {BoardCorner::bottom_left, BoardCorner::bottom_right,
                             BoardCorner::top_left, BoardCorner::top_right}) {
@@ -228,7 +228,7 @@ TEST(CheckFlatBoardLayout, NamesEveryIdOrder) {
   }
 }
 
-TEST(CheckFlatBoardLayout, ToleranceOfSpacingIsFivePercentOfPitchOrOneWithLens) {
+TEST(CheckFlatBoardLayout, SpacingToleranceIsFivePercentOrOnePercentWithLens) {
   const std::array parameters{800.0, 800.0, 1000.0, 1000.0};
   const Lens lens(LensModel::pinhole, parameters);
   const auto views = make_flat_views(small_board(), {{1000, 0.3, 0}, {1000, -2, 0}});
@@ -341,7 +341,7 @@ TEST(CheckCharucoLayout, ReportsSquareToMarkerRatioOffBy15Percent) {
             "a square is 1.67 markers wide by board.yaml, but 1.33 in the images");
 }
 
-TEST(CheckCharucoLayout, NamesSquaresThatMarkersShow) {
+TEST(CheckCharucoLayout, ReportsNumberOfSquaresDerivedFromMarkers) {
   const auto views = make_flat_views(charuco_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
   Board stated = charuco_board();
   stated.cols = 8;
@@ -378,7 +378,7 @@ TEST(CheckCharucoLayout, NamesColorOfFirstSquareForOddNumberOfColumns) {
   }
 }
 
-TEST(CheckCharucoLayout, KeepsStatedRowsIfFewerAreSeen) {
+TEST(CheckCharucoLayout, KeepsGivenNumberOfRowsIfFewerAreDetected) {
   const auto views = make_flat_views(charuco_board(), {{1000, 0.3, 0}, {1500, -2, 0}});
   Board stated = charuco_board();
   stated.rows = 9;

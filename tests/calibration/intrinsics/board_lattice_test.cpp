@@ -27,7 +27,7 @@ BoardDetection make_points_of_part(const BoardLattice& lattice, std::size_t part
   return seen;
 }
 
-TEST(BoardLattice, TwelvePointsInTwoRowsDeterminePoseOfBoardInOnePart) {
+TEST(BoardLattice, PoseOfContiguousLatticeNeedsTwelvePointsInTwoRows) {
   const BoardLattice lattice(synthetic_board(false));
   ASSERT_EQ(lattice.num_board_parts(), 1U);
   EXPECT_TRUE(lattice.can_determine_pose(make_points_of_part(lattice, 0, 6, 2)));
@@ -39,7 +39,7 @@ TEST(BoardLattice, TwelvePointsInTwoRowsDeterminePoseOfBoardInOnePart) {
   EXPECT_FALSE(lattice.can_determine_pose(eleven));
 }
 
-TEST(BoardLattice, SixPointsOfEachPartDeterminePoseOfBoardInFourParts) {
+TEST(BoardLattice, PoseOfSpacedTagsNeedsSixPointsOfEachCornerKind) {
   const BoardLattice lattice(synthetic_board(true));
   ASSERT_EQ(lattice.num_board_parts(), 4U);
   BoardDetection seen;
@@ -73,7 +73,7 @@ Board squares_board() {
   return board;
 }
 
-TEST(BoardLattice, DimensionsOfBoardInOnePart) {
+TEST(BoardLattice, ContiguousTagsFormOneLattice) {
   const BoardLattice lattice(synthetic_board(false));
   EXPECT_EQ(lattice.num_board_parts(), 1U);
   EXPECT_EQ(lattice.lattice_cols(), 12);
@@ -89,7 +89,7 @@ TEST(BoardLattice, DimensionsOfBoardInOnePart) {
   EXPECT_EQ(lattice.get_tag_of_point(119), 29U);
 }
 
-TEST(BoardLattice, DimensionsOfBoardInFourParts) {
+TEST(BoardLattice, SpacedTagsFormFourLattices) {
   const BoardLattice lattice(spaced_board());
   EXPECT_EQ(lattice.num_board_parts(), 4U);
   EXPECT_EQ(lattice.lattice_cols(), 4);
@@ -133,7 +133,7 @@ TagDetection make_tag_with_all_fields(int id, const TagDetection::Corners& corne
   return tag;
 }
 
-TEST(BoardLattice, ListsCornersOfTagsOfBoardInOnePart) {
+TEST(BoardLattice, ListsCornersOfContiguousTags) {
   const Board board = synthetic_board(false);  // ids from the bottom left along rows
   const BoardLattice lattice(board);
   const TagDetection tag = make_tag_with_all_fields(8, {{{10, 90}, {50, 90}, {50, 20}, {10, 20}}});

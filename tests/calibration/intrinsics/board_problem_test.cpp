@@ -44,19 +44,19 @@ double compute_max_residual_difference_px(const BoardProblem& a, const BoardProb
   return max_px;
 }
 
-class SolveStage : public testing::TestWithParam<LensModel> {};
+class SolveIntermediateStage : public testing::TestWithParam<LensModel> {};
 
-TEST_P(SolveStage, ReachesMinimumOfFinalSolve) {
+TEST_P(SolveIntermediateStage, ReachesMinimumOfFinalSolve) {
   const BoardProblem start = make_problem_beside_minimum(GetParam(), 12);
   ASSERT_FALSE(start.intrinsics.empty());
   BoardProblem intermediate = start, final = start;
-  ASSERT_TRUE(solve_stage(intermediate, kLens));
+  ASSERT_TRUE(solve_intermediate_stage(intermediate, kLens));
   ASSERT_TRUE(solve_board_problem(final, kLens));
   EXPECT_GT(compute_max_residual_difference_px(start, final), 1);
   EXPECT_LT(compute_max_residual_difference_px(intermediate, final), 0.001);
   EXPECT_NE(intermediate.intrinsics, final.intrinsics) << "not by Ceres with a larger tolerance";
 }
-INSTANTIATE_TEST_SUITE_P(Models, SolveStage,
+INSTANTIATE_TEST_SUITE_P(Models, SolveIntermediateStage,
                          testing::Values(LensModel::opencv4, LensModel::opencv8,
                                          LensModel::stereographic, LensModel::fisheye),
                          [](const auto& model) {

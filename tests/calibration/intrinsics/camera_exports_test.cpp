@@ -65,7 +65,7 @@ TEST(FormatRos, WritesAllFieldsForPinhole) {
             "  data: [510.5, 0, 400, 0, 0, 501, 300.25, 0, 0, 0, 1, 0]\n");
 }
 
-TEST(FormatRos, WritesNumberOfCoefficientsOfEachModel) {
+TEST(FormatRos, WritesAsManyCoefficientsAsEachModelHas) {
   struct Expected {
     Camera camera;
     std::string distortion;

@@ -58,7 +58,7 @@ TEST_F(ReadAnyCamera, ReturnsExportedCameraExactlyFromEachFormat) {
   }
 }
 
-TEST_F(ReadAnyCamera, ReturnsSplinedLensExactlyFromCameramodelTheOnlyFormatForIt) {
+TEST_F(ReadAnyCamera, ReturnsSplinedLensExactlyFromCameramodel) {
   const Camera camera = splined_camera();
   comes_back(camera, format_cameramodel(camera), camera.lens_model);
   for (const auto& format_camera : {format_ros, format_camchain, format_opencv}) {
@@ -171,7 +171,7 @@ TEST_F(ReadAnyCamera, ReadsCameramodelWithAnyBracketsQuotesAndBlanks) {
   EXPECT_TRUE(read.region.empty());
 }
 
-TEST_F(ReadAnyCamera, ReadsOpenOrClosedRegionOfThreePixelsOrMore) {
+TEST_F(ReadAnyCamera, ReadsOpenOrClosedPolygonOfValidRegion) {
   const auto with_region = [](const std::string& region) {
     return cameramodel_with("[800, 600]", "[520, 521, 402, 297]",
                             ", 'valid_intrinsics_region': " + region);

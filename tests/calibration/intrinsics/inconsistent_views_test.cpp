@@ -55,7 +55,7 @@ TEST(TestViewConsistency, ReturnsViewsOfOtherCamera) {
   }
 }
 
-TEST(TestViewConsistency, ReturnsNoneForOneCamera) {
+TEST(TestViewConsistency, ReturnsNoViewsForImagesOfOneCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(4);
   for (int set = 0; set < 10; ++set) {

@@ -53,12 +53,12 @@ void expect_chosen(const Lens& lens) {
   const auto choice = select_lens_model(InitialSolutions(seen_through(lens, count)));
   ASSERT_TRUE(choice);
   EXPECT_EQ(lens_model_name(choice->model), lens_model_name(lens.lens_model()))
-      << describe_choice(*choice);
+      << describe_lens_choice(*choice);
   // Noise, and errors outside the region of the other views.
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.25 * kNoise_px);
   EXPECT_EQ(choice->candidates.size(), 5U);
-  EXPECT_TRUE(describe_choice(*choice).starts_with(lens_model_name(lens.lens_model())))
-      << describe_choice(*choice);
+  EXPECT_TRUE(describe_lens_choice(*choice).starts_with(lens_model_name(lens.lens_model())))
+      << describe_lens_choice(*choice);
 }
 
 TEST(SelectLensModel, ReturnsOpencv4ForRadialLens) { expect_chosen(radial_lens()); }
@@ -76,7 +76,7 @@ TEST(SelectLensModel, ReturnsRationalModelDespiteOneBadView) {
   const auto choice = select_lens_model(InitialSolutions(input));
   ASSERT_TRUE(choice);
   EXPECT_TRUE(choice->model == LensModel::opencv8 || choice->model == LensModel::opencv12)
-      << describe_choice(*choice);
+      << describe_lens_choice(*choice);
   EXPECT_NEAR(find_rms(*choice, choice->model), kNoise_px, 0.4 * kNoise_px);
 }
 
@@ -101,7 +101,7 @@ TEST(SelectLensModel, RejectsOpencv4ForRationalLensEvenIfFewViewsLieFarFromCente
   const auto choice = select_lens_model(InitialSolutions(input));
   ASSERT_TRUE(choice);
   EXPECT_NE(lens_model_name(choice->model), lens_model_name(LensModel::opencv4))
-      << describe_choice(*choice);
+      << describe_lens_choice(*choice);
   EXPECT_LT(find_rms(*choice, choice->model), 2 * kNoise_px);
 }
 
@@ -110,7 +110,7 @@ TEST(SelectLensModel, ReturnsNulloptForFewerThanSixViews) {
   EXPECT_TRUE(select_lens_model(InitialSolutions(seen_through(radial_lens(), 6))));
 }
 
-TEST(SelectLensModel, ReturnsFisheyeForCornersBeyondRightAngle) {
+TEST(SelectLensModel, ReturnsFisheyeForCornersBeyond90DegreesOffAxis) {
   Random random(44);
   const auto choice = select_lens_model(InitialSolutions(wide_input(false, 24, random, kNoise_px)));
   ASSERT_TRUE(choice);
@@ -149,16 +149,16 @@ TEST(IsFisheyeWorse, ReturnsTrueOnlyForLensThatFisheyeCannotFit) {
   EXPECT_FALSE(is_worse(fisheye_lens(), LensModel::opencv4));
 }
 
-TEST(IsFisheyeWorse, ReturnsFalseBeyondRightAngle) {
+TEST(IsFisheyeWorse, ReturnsFalseBeyond90DegreesOffAxis) {
   Random random(44);
   const InitialSolutions initial(wide_input(false, 24, random, kNoise_px));
   EXPECT_FALSE(is_fisheye_worse(initial, LensModel::opencv8));
 }
 
-TEST(DescribeChoice, StatesOffAxisAngleWhenBoardIsBeyondRightAngle) {
+TEST(DescribeLensChoice, StatesOffAxisAngleWhenBoardIsBeyond90DegreesOffAxis) {
   const LensChoice choice{
       LensModel::fisheye, {{LensModel::opencv4}, {LensModel::fisheye, 0.0512, 0, 0}}, 1.7};
-  EXPECT_EQ(describe_choice(choice),
+  EXPECT_EQ(describe_lens_choice(choice),
             "OPENCV_FISHEYE 0.0512 px (0.0 % above the best, limit 0.0 %) in held-out views; the "
             "board is visible up to 97 degrees off axis, where no LENSMODEL_OPENCVn has rays");
 }

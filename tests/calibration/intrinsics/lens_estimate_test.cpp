@@ -207,7 +207,7 @@ TEST(EstimateLens, RecommendsFisheyeForBoardsFarOffAxis) {
                                                        HasSubstr("use --lens OPENCV_FISHEYE"))));
 }
 
-TEST(EstimateLens, ChoosesFisheyeForBoardsBeyondRightAngle) {
+TEST(EstimateLens, ChoosesFisheyeForBoardsBeyond90DegreesOffAxis) {
   LensViews input = make_wide_views(16, 180, LensModel::opencv8);
   input.choose_lens_model = true;
   const LensEstimate result = estimate_lens(input);
@@ -253,7 +253,7 @@ TEST(EstimateLens, StatesThatViewsAreParallel) {
                                                   "board at the same angle"));
 }
 
-TEST(EstimateLens, CovarianceIsThatByTagsPlusBiasOfRegularization) {
+TEST(EstimateLens, CovarianceAssumesOneErrorPerTagAndAddsRegularizationBias) {
   LensViews input = make_views(7);
   const LensEstimate result = estimate_lens(input);
   ASSERT_TRUE(result.has_succeeded()) << result.problem;
@@ -314,7 +314,7 @@ TEST(EstimateLens, ReturnsWrongBoardForSpacingThatOnlyLensContradicts) {
   EXPECT_TRUE(result.solution.has_succeeded());
 }
 
-TEST(EstimateLens, ComparesModelsWithFiveViewsUnlessSplined) {
+TEST(EstimateLens, ComparesLensModelsFromFiveViewsOn) {
   for (const int count : {4, 5}) {
     const LensEstimate result = estimate_lens(make_views(count));
     ASSERT_TRUE(result.has_succeeded()) << result.problem;

@@ -199,7 +199,7 @@ TEST(ComputeMtf50OfBlur, IsFrequencyOfHalfModulation) {
   }
 }
 
-TEST(MeasureSharpness, EachPartHasLowerQuartileOfViewMedians) {
+TEST(MeasureSharpness, SharpnessOfImagePartIsLowerQuartileOfViewMedians) {
   // Upper medians of the four edges: 1.1 times the blur of the view.
   const std::array<double, 4> edges{1.1, 0.9, 1.4, 1.0};
   const std::array<double, 8> views{1.3, 1.0, 1.7, 1.1, 1.4, 1.6, 1.2, 1.5};
@@ -228,7 +228,7 @@ TEST(MeasureSharpness, EachPartHasLowerQuartileOfViewMedians) {
   }
 }
 
-TEST(MeasureSharpness, EdgeCountsForPartOfItsMiddle) {
+TEST(MeasureSharpness, EdgeBelongsToImagePartOfItsMiddle) {
   // A tag 220 px wide and 100 px high: the middle of each edge is in a part of its own.
   auto views = make_views_of_parts(
       [](int col, int row, int, std::size_t) {

@@ -73,7 +73,7 @@ TEST_F(CombineModelFits, ReturnsDifferenceToOneModel) {
 }
 
 /// The covariances of differences in other directions add up if noise explains none of them.
-TEST_F(CombineModelFits, AddsDifferencesInOtherDirections) {
+TEST_F(CombineModelFits, CovariancesOfDifferencesInDifferentDirectionsAdd) {
   const IntrinsicsSolution bent = solve_exact_views(LensModel::opencv5, 520, -0.22);
   const auto first = compute({longer}), second = compute({bent}), both = compute({bent, longer});
   ASSERT_TRUE(first && second && both);

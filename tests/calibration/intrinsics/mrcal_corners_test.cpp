@@ -209,7 +209,7 @@ TEST_F(ReadMrcalCornerText, SkipsCornersThatWereNotSeen) {
   }
 }
 
-TEST_F(ReadMrcalCornerText, WeightIsPowerOfWholeLevel) {
+TEST_F(ReadMrcalCornerText, WeightIsTwoToThePowerOfMinusLevel) {
   for (const auto& [level, weight] : std::vector<std::pair<std::string, double>>{
            {"0.9", 1}, {"1.9", 0.5}, {"2", 0.25}, {"30", std::pow(0.5, 30)}}) {
     const auto views = read(make_rows("a.png", 12, 3, " " + level));
@@ -267,7 +267,7 @@ TEST_F(ReadMrcalCornerText, MergesPartsOfImageInAnyOrder) {
   }
 }
 
-TEST_F(ReadMrcalCornerText, RenumbersCornersFromTopLeftOfBoardInOnePart) {
+TEST_F(ReadMrcalCornerText, RenumbersCornersOfChessboardFromTopLeft) {
   // The corners of a mirrored numbering: rows count from the bottom.
   std::string rows;
   for (int i = 0; i < 12; ++i) {
@@ -284,7 +284,7 @@ TEST_F(ReadMrcalCornerText, RenumbersCornersFromTopLeftOfBoardInOnePart) {
 }
 
 /// Errors name the line of the row that is wrong.
-TEST_F(ReadMrcalCornerText, RejectsTextsThatAreNoTableOfTheBoard) {
+TEST_F(ReadMrcalCornerText, RejectsTablesOfOtherBoards) {
   struct Refusal {
     std::string text, line;
     Board board = chessboard();

@@ -66,7 +66,7 @@ TEST(WriteCameramodel, WritesLensWith17DigitsAndImageSize) {
 }
 
 /// Weights are divided by the noise.
-TEST(WriteCameramodel, WritesSolvedProblem) {
+TEST(WriteCameramodel, WritesOptimizationInputsForMrcal) {
   if (run_program("/usr/bin/python3 -c 'import numpy'").exit_code != 0) GTEST_SKIP() << "no numpy";
   std::string points;
   for (int i = 0; i < 12; ++i) {

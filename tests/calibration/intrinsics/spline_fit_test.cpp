@@ -83,7 +83,7 @@ TEST(ResizeSplineGrid, ReturnsSmallestGridThatCoversGivenExtent) {
 }
 
 /// Image corners are 400 / 300 and 300 / 300 from the center in the stereographic plane.
-TEST(ExplainCoarseGrid, NamesGridThatCoversImageAndAnglesOffAxis) {
+TEST(ExplainCoarseGrid, ReportsOffAxisAnglesAndSufficientGrid) {
   const Lens lens = make_stereographic(300, 300, 400, 300);
   EXPECT_EQ(explain_coarse_grid(lens, {801, 601}, splined_lens_model({3, 4, 4, 300}),
                                 {300, 300, 400, 300}),

@@ -66,7 +66,7 @@ TEST(DescribeMapErrors, DescribesEachKindDifferently) {
   EXPECT_THAT(describe_moved_lamps(3), testing::StartsWith("3 lamps"));
 }
 
-TEST(IsMapUnusable, HoldsForSwappedOrMirroredLampsOnly) {
+TEST(IsMapUnusable, ReturnsTrueOnlyForSwappedOrMirroredLamps) {
   MapErrors found;
   EXPECT_FALSE(found.is_map_unusable());
   for (const auto& [kind, is_unusable] :

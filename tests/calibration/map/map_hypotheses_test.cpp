@@ -175,7 +175,7 @@ TEST_F(ChooseMapError, OffsetsOfTwoMovedLampsHaveSdsFromSurveySdOfEachLamp) {
 }
 
 /// With two free lamps of eight, 28 pairs are tested together.
-TEST_F(ChooseMapError, SecondMovedLampIsSignificantFromBoundOfAllPairsOn) {
+TEST_F(ChooseMapError, SecondMovedLampIsReportedAboveBoundForAllPairs) {
   constexpr std::size_t first = 1, second = 4;
   const double bound = -2 * std::log(0.01 / 28);
   for (std::size_t i = 0; i < 8; ++i) map.lamps[i].sd_m = 1e-4 * static_cast<double>(2 + i % 3);
@@ -240,7 +240,7 @@ TEST_F(ChooseMapError, TooSmallSurveySdsAreIncreasedAndBoundDependsOnAllLamps) {
 
 /// Without known standard deviations, chi-squared of the original map has to exceed that of the
 /// swapped one, with 12 degrees of freedom, by the factor (0.01 / 29)^(-2 / 12).
-TEST_F(ChooseMapError, SwappedLampsAreReportedFromBoundOfFDistributionOn) {
+TEST_F(ChooseMapError, SwappedLampsAreReportedAboveBoundOfFDistribution) {
   const double bound = std::pow(0.01 / 29, -2.0 / 12);
   const auto swap_lamps = [&](double distance_m) {
     room.map.lamps[5].position_m =

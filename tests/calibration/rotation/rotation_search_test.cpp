@@ -74,7 +74,7 @@ TEST(DetectPivots, RequiresThreeCapturesWithDetections) {
 }
 
 /// Two captures with a fix, and others without one.
-TEST(DetectPivots, StatusFollowsReasonsForWhichFixesFail) {
+TEST(DetectPivots, StatusIsMostFrequentReasonOfFailedFixes) {
   RotationScene mirrored;
   for (Lamp& lamp : mirrored.map.lamps) lamp.position_m.x() *= -1;
   const auto one_lamp = [](Frame& frame) { frame.detections.resize(1); };

@@ -62,7 +62,7 @@ Found measure(const Scene& scene, std::size_t count, double min_side_px = 0) {
         simulate_sensor_image(scene.sensor, renderer.render_board(shot), i, scene.processing);
     views.push_back({shot.image, scene.camera.imager_px, detector.detect_board(image)});
   }
-  correct_views(views, sum_tone_curve_costs(views));
+  correct_views_for_tone_curve(views, sum_tone_curve_costs(views));
   std::vector<double> blurs_px, ratios;
   for (const BoardView& view : views) {
     for (const TagDetection& tag : view.detection.tags) {

@@ -42,10 +42,10 @@ BoardView image(double gamma, double clearly) {
 }
 
 double apply_curve_of_levels(std::vector<BoardView>& views) {
-  return correct_views(views, sum_tone_curve_costs(views));
+  return correct_views_for_tone_curve(views, sum_tone_curve_costs(views));
 }
 
-TEST(CorrectViews, InterpolatesCornersAndCurvaturesAtEstimatedGamma) {
+TEST(CorrectViewsForToneCurve, InterpolatesCornersAndCurvaturesAtEstimatedGamma) {
   for (const double gamma : {1.25, 1.7, 2.2, 2.4}) {
     std::vector<BoardView> images{image(gamma, 500)};
     EXPECT_NEAR(apply_curve_of_levels(images), gamma, 1e-9);
@@ -60,7 +60,7 @@ TEST(CorrectViews, InterpolatesCornersAndCurvaturesAtEstimatedGamma) {
   }
 }
 
-TEST(CorrectViews, CorrectsAllViewsForOneCommonGamma) {
+TEST(CorrectViewsForToneCurve, CorrectsAllViewsForOneCommonGamma) {
   std::vector<BoardView> images{image(1.6, 300), image(2.0, 300), image(1.1, 10)};
   const double gamma = apply_curve_of_levels(images);
   EXPECT_NEAR(gamma, 1.76, 0.03);
@@ -69,14 +69,14 @@ TEST(CorrectViews, CorrectsAllViewsForOneCommonGamma) {
   }
 }
 
-TEST(CorrectViews, KeepsCornersWhenOnlyOneOfManyViewsShowsCurve) {
+TEST(CorrectViewsForToneCurve, KeepsCornersWhenOnlyOneOfManyViewsShowsCurve) {
   std::vector<BoardView> images(12, image(1, 500));
   images.push_back(image(2.4, 1e7));
   EXPECT_EQ(apply_curve_of_levels(images), 1);
   EXPECT_EQ(images.back().detection.tags[0].corners_px[0].x(), 100);
 }
 
-TEST(CorrectViews, ChangesNoCornersOfViewsWithoutToneCurveFits) {
+TEST(CorrectViewsForToneCurve, ChangesNoCornersOfViewsWithoutToneCurveFits) {
   BoardView plain = image(1, 500);
   plain.detection.curve_costs.resize(2);
   plain.detection.tags[0].tone_curve_fits.clear();
@@ -86,7 +86,7 @@ TEST(CorrectViews, ChangesNoCornersOfViewsWithoutToneCurveFits) {
   EXPECT_LT(images[1].detection.tags[0].corners_px[0].x(), 99.8);
 }
 
-TEST(CorrectViews, KeepsCornersWhenRepeated) {
+TEST(CorrectViewsForToneCurve, KeepsCornersWhenRepeated) {
   std::vector<BoardView> images{image(2, 500)};
   apply_curve_of_levels(images);
   const auto once = images[0].detection.tags[0].corners_px;
@@ -94,13 +94,13 @@ TEST(CorrectViews, KeepsCornersWhenRepeated) {
   EXPECT_EQ(images[0].detection.tags[0].corners_px, once);
 }
 
-TEST(CorrectViews, EstimatesGammaOfOneWithoutViewsOrTags) {
+TEST(CorrectViewsForToneCurve, EstimatesGammaOfOneWithoutViewsOrTags) {
   std::vector<BoardView> none, without(2);
   EXPECT_EQ(apply_curve_of_levels(none), 1);
   EXPECT_EQ(apply_curve_of_levels(without), 1);
 }
 
-TEST(CorrectViews, CorrectsCornersFromGammaOf1p2) {
+TEST(CorrectViewsForToneCurve, CorrectsCornersFromGammaOf1p2) {
   for (const auto& [gamma, is_corrected] : {std::pair(1.19, false), std::pair(1.21, true)}) {
     std::vector<BoardView> images{image(gamma, 500)};
     EXPECT_NEAR(apply_curve_of_levels(images), is_corrected ? gamma : 1, 1e-9);
@@ -111,7 +111,7 @@ TEST(CorrectViews, CorrectsCornersFromGammaOf1p2) {
   }
 }
 
-TEST(CorrectViews, InterpolatesSdsAndStepsBetweenAdjacentGammas) {
+TEST(CorrectViewsForToneCurve, InterpolatesSdsAndStepsBetweenAdjacentGammas) {
   for (const double gamma : {1.25, 1.45, 1.8, 2.2}) {
     SCOPED_TRACE(gamma);
     std::vector<BoardView> images{image(gamma, 500)};

@@ -67,7 +67,7 @@ TEST(TouchingTags, FindsAllTagsFromOneTag) {
   const TouchingTags touching(drawn.board);
   for (const std::size_t seed : {0U, 5U, 11U}) {
     const auto [found, rejected_predictions] =
-        touching.complete_tags({drawn.truth[seed]}, drawn.levels);
+        touching.refine_and_complete_tags({drawn.truth[seed]}, drawn.levels);
     EXPECT_TRUE(rejected_predictions.empty());
     ASSERT_EQ(found.size(), drawn.truth.size()) << seed;
     EXPECT_EQ(found.front().id, drawn.truth[seed].id);
@@ -117,10 +117,10 @@ TEST(TouchingTags, FindsMissingTagsOnlyNextToOtherTags) {
   const Eigen::Vector2i at = drawn.truth[1].corners_px[3].array().round().cast<int>();
   image(cv::Rect(at.x() - 2, at.y() - 2, 44, 44)) = 200;
   const TouchingTags touching(drawn.board);
-  EXPECT_EQ(touching.complete_tags({drawn.truth[0]}, drawn.levels).tags.size(), 5U);
-  EXPECT_LE(touching.complete_tags({drawn.truth[0]}, smooth(image)).tags.size(), 1U)
+  EXPECT_EQ(touching.refine_and_complete_tags({drawn.truth[0]}, drawn.levels).tags.size(), 5U);
+  EXPECT_LE(touching.refine_and_complete_tags({drawn.truth[0]}, smooth(image)).tags.size(), 1U)
       << "the next tag is 2.4 tag widths away";
-  EXPECT_TRUE(touching.complete_tags({}, drawn.levels).tags.empty());
+  EXPECT_TRUE(touching.refine_and_complete_tags({}, drawn.levels).tags.empty());
 }
 
 /// Overexposed white grows by about 1 px on each side, as in photographs of boards in the sun.

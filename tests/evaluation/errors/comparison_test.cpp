@@ -58,7 +58,7 @@ TEST(CompareFixErrors, ReturnsEquivalentForDifferencesBelowOnePercent) {
   const Pairs tenth = pairs(100, 1e-4);
   EXPECT_EQ(compare_fix_errors(tenth.fixes, tenth.errors, tenth.others, tenth.other_errors, 1)
                 .horizontal()
-                .describe_result(list_quantities()[0]),
+                .describe_result(list_compared_quantities()[0]),
             "equivalent within 0.15 mm");
   // For small errors the smallest relevant difference is a micrometer.
   Pairs small = pairs(100, 0);
@@ -67,7 +67,7 @@ TEST(CompareFixErrors, ReturnsEquivalentForDifferencesBelowOnePercent) {
   QuantityComparison comparison =
       compare_fix_errors(small.fixes, small.errors, small.others, small.other_errors, 1)
           .horizontal();
-  const ComparedQuantity& horizontal = list_quantities()[0];
+  const ComparedQuantity& horizontal = list_compared_quantities()[0];
   EXPECT_EQ(comparison.describe_result(horizontal), "equivalent within 0.001 mm");
   ASSERT_TRUE(comparison.interval);
   EXPECT_GT(comparison.interval->low, 0);

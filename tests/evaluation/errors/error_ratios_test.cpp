@@ -91,7 +91,7 @@ TEST(CrlbRatio, AreErrorsBelowCrlbIsTrueOnlyForSignificantlySmallerErrors) {
 
 /// Every sixth camera is 10 m below the lamps, the others 2 m: their limit is five times as large,
 /// and a few fixes make up most of the ratio.
-TEST(CrlbRatio, AreErrorsBelowCrlbIsHardlyEverTrueByChanceForUnequalLimits) {
+TEST(CrlbRatio, AreErrorsBelowCrlbIsRarelyTrueByChanceForUnequalLimits) {
   Random random(4);
   constexpr int trials = 300;
   constexpr std::size_t fixes = 60;

@@ -73,8 +73,9 @@ TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRo
     ASSERT_TRUE(light);
     const Vector2d oval = complex_product(light->outline_equations->scanline_gradient, motion) / 2;
     MeasuredLight unshifted = *light;
-    shape.correct_light({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
-    shape.correct_light({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), unshifted);
+    shape.correct_center_for_motion({oval, 1e-12 * Matrix2::Identity()}, motion, *light);
+    shape.correct_center_for_motion({oval, 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),
+                                    unshifted);
     EXPECT_THAT(light->pixel, IsNear(center_px, 2e-3));
     EXPECT_GT((unshifted.pixel - center_px).norm(), 8e-3) << "read sooner than its center";
   }
@@ -83,7 +84,8 @@ TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesPositionAtReadoutOfCenterRo
 TEST_F(LightShapeOfMovingDisc, CorrectedCenterMatchesTrueCenterForStationaryCamera) {
   auto light = fit_light(Vector2d::Zero());
   ASSERT_TRUE(light);
-  shape.correct_light({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(), *light);
+  shape.correct_center_for_motion({Vector2d::Zero(), 1e-12 * Matrix2::Identity()}, Vector2d::Zero(),
+                                  *light);
   EXPECT_THAT(light->pixel, IsNear(center_px, 1e-6));
 }
 

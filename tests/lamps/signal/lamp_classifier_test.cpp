@@ -53,7 +53,7 @@ TEST(LampClassifier, IdentifiesNearlyAllLightsOfTrainedLamps) {
   EXPECT_EQ(confusion.count_wrong(), 0);
   EXPECT_GE(confusion.count_correct(), 297);
   EXPECT_EQ(confusion.count_correct() + confusion.count_unidentified(), 300);
-  EXPECT_TRUE(list_inseparable(classifier).empty());
+  EXPECT_TRUE(list_inseparable_lamps(classifier).empty());
 }
 
 TEST(LampClassifier, SeparatesLampsOfEqualPeriodByDuty) {
@@ -79,7 +79,7 @@ TEST(LampClassifier, ReportsUnknownForInseparableLamps) {
       compute_confusion_matrix(classifier, make_lights(similar_lamps, 100, 2));
   EXPECT_EQ(confusion.counts(0, 0), 100);
   EXPECT_GE(confusion.count_unidentified(), 190);
-  const auto pairs = list_inseparable(classifier);
+  const auto pairs = list_inseparable_lamps(classifier);
   ASSERT_EQ(pairs.size(), 1);
   EXPECT_EQ(pairs[0].first, 7);
   EXPECT_EQ(pairs[0].second, 9);

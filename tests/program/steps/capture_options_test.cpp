@@ -20,10 +20,10 @@ TEST(MotionOptions, MakeMotionPriorIsNulloptWithoutSpeed) {
             drives.make_motion_prior()->velocity_sd_m_per_s);
 }
 
-TEST(CheckFrameStep, ThrowsForStepAboveOneWithoutVideo) {
-  check_frame_step(1, {"boards"});
-  check_frame_step(5, {"boards", "boards.mp4"});
-  EXPECT_EQ(rejection_message<std::invalid_argument>([] { check_frame_step(5, {"boards"}); }),
+TEST(CheckEveryOption, ThrowsForStepAboveOneWithoutVideo) {
+  check_every_option(1, {"boards"});
+  check_every_option(5, {"boards", "boards.mp4"});
+  EXPECT_EQ(rejection_message<std::invalid_argument>([] { check_every_option(5, {"boards"}); }),
             "--every: there is no video; leave it out");
 }
 

@@ -20,11 +20,11 @@ TEST(ComputeThinningStep, ReturnsSmallestStepThatKeepsAtMostLimit) {
   EXPECT_EQ(describe_thinning(230, 23), "every 23rd of 230 drawn");
 }
 
-TEST(ThinOut, ReturnsAscendingIndicesOfEveryNthAndLargest) {
+TEST(ThinOutIndices, ReturnsAscendingIndicesOfEveryNthAndLargest) {
   const std::vector<double> values = {1, 9, 2, 3, 9, 8, 0};
-  EXPECT_THAT(thin_out(values, 3, 2), ElementsAre(0, 1, 3, 4, 6));
-  EXPECT_THAT(thin_out(values, 3, 0), ElementsAre(0, 3, 6));
-  EXPECT_THAT(thin_out({}, 3, 2), ElementsAre());
+  EXPECT_THAT(thin_out_indices(values, 3, 2), ElementsAre(0, 1, 3, 4, 6));
+  EXPECT_THAT(thin_out_indices(values, 3, 0), ElementsAre(0, 3, 6));
+  EXPECT_THAT(thin_out_indices({}, 3, 2), ElementsAre());
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 constexpr const char* kView = VLP_SOURCE_DIR "/datasets/paper-rig/rendered/sample-boards/0000.png";
 
 /// Unit of the station in datasets/station, initially without images.
-struct UnitTest : testing::Test {
+struct StationUnitTest : testing::Test {
   StationConfig config = read_station_config(VLP_SOURCE_DIR "/datasets/station/station.yaml");
   TemporaryFolder folder;
   Unit unit{config, std::string(64, 'x'), {"test", "0"}, 1};
@@ -33,7 +33,7 @@ struct UnitTest : testing::Test {
   }
 };
 
-TEST_F(UnitTest, StartsWithBoardsStepAndInvalidVerdict) {
+TEST_F(StationUnitTest, StartsWithBoardsStepAndInvalidVerdict) {
   EXPECT_EQ(unit.first_incomplete(), StationStep::boards);
   EXPECT_FALSE(unit.latest_calibration());
   EXPECT_THAT(list_failure_causes(unit),
@@ -41,7 +41,7 @@ TEST_F(UnitTest, StartsWithBoardsStepAndInvalidVerdict) {
   EXPECT_EQ(decide_verdict(list_failure_causes(unit)), Verdict::invalid);
 }
 
-TEST_F(UnitTest, CanNoLongerPassAfterMaxConsecutiveRejections) {
+TEST_F(StationUnitTest, CanNoLongerPassAfterMaxConsecutiveRejections) {
   for (int i = 0; i < config.max_consecutive_rejections; ++i) {
     EXPECT_FALSE(unit.can_no_longer_pass()) << i;
     add_bad(i);
@@ -59,7 +59,7 @@ TEST_F(UnitTest, CanNoLongerPassAfterMaxConsecutiveRejections) {
 }
 
 /// As after a restart of a killed program: all images arrive at once, by name.
-TEST_F(UnitTest, CanStillPassWhenOneImageOfBatchIsUsed) {
+TEST_F(StationUnitTest, CanStillPassWhenOneImageOfBatchIsUsed) {
   const auto valid_view = folder / "000.png";
   fs::copy_file(kView, valid_view);
   std::vector<fs::path> together{valid_view};
@@ -78,7 +78,7 @@ TEST_F(UnitTest, CanStillPassWhenOneImageOfBatchIsUsed) {
   EXPECT_TRUE(unit.can_no_longer_pass());
 }
 
-TEST_F(UnitTest, VerdictIsInvalidWhenUnitIsEndedEarly) {
+TEST_F(StationUnitTest, VerdictIsInvalidWhenUnitIsEndedEarly) {
   unit.end_early("the operator ended the run");
   EXPECT_THAT(
       list_failure_causes(unit),
@@ -141,7 +141,7 @@ TEST(MakeVerdictScreen, NamesUnfinishedStepOrUnmeasuredGates) {
             "Gates    not measured: blur_px, rms_px, rotation_px, dispersion_mm");
 }
 
-TEST_F(UnitTest, RejectsImageUsedByAnotherCamera) {
+TEST_F(StationUnitTest, RejectsImageUsedByAnotherCamera) {
   unit.set_image_lookup([](const std::string&) { return ImageUser{"0001", "R"}; });
   fs::copy_file(kView, folder / "0.png");
   unit.add_step_images(StationStep::boards, {folder / "0.png"});
@@ -175,7 +175,7 @@ TEST(DecideVerdict, ReturnsVerdictOfFirstCause) {
   EXPECT_EQ(decide_verdict({{"lamp 5 is loose"}, {"the fixes are off", true}}), Verdict::invalid);
 }
 
-TEST_F(UnitTest, QueuesImagesOfStepUntilPreviousStepIsComplete) {
+TEST_F(StationUnitTest, QueuesImagesOfStepUntilPreviousStepIsComplete) {
   const auto file = folder.file("0.png", "no image");
   unit.add_step_images(StationStep::check, {file});
   unit.solve_completed(false);
@@ -184,7 +184,7 @@ TEST_F(UnitTest, QueuesImagesOfStepUntilPreviousStepIsComplete) {
   EXPECT_TRUE(unit.step_state(StationStep::check).pending_images.empty());
 }
 
-TEST_F(UnitTest, ScreenLinesHaveAtMost80Characters) {
+TEST_F(StationUnitTest, ScreenLinesHaveAtMost80Characters) {
   add_bad(1);
   add_bad(2);
   for (const ScreenLine& line : make_station_screen(unit))
@@ -196,7 +196,7 @@ TEST_F(UnitTest, ScreenLinesHaveAtMost80Characters) {
   }
 }
 
-TEST_F(UnitTest, ReportStatesVerdictOrNoneForEditedRecord) {
+TEST_F(StationUnitTest, ReportStatesVerdictOrNoneForEditedRecord) {
   RunRecord record = make_unit_record(unit, make_run_id(), {"test", "0"});
   EXPECT_THAT(make_run_report(record, "", {}),
               AllOf(HasSubstr("<strong>INVALID</strong><p>boards: too few images"),
