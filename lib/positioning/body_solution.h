@@ -78,7 +78,7 @@ InitialStates solve_for_three_lamps(const FrameObservations& frame,
                                     const BodyProblem& problem);
 
 /// Returns true if the standard deviation of the position is at most the mean distance to the
-/// lamps, and a quarter of it if motion or tilt are estimated.
+/// lamps. If motion or tilt are estimated, the limit is a quarter of it.
 bool is_position_determined(const FrameObservations& frame, const BodyPrior& prior,
                             const BodyFix& fix);
 

@@ -74,8 +74,8 @@ class CommonErrors {
   using RayJacobian = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::ColMajor, 3, 20>;
   RayJacobian differentiate_ray(const Eigen::Vector3d& ray_in_base, const Lens& lens) const;
 
-  /// G: derivatives of the first `States` states of a fix, or of the residuals of an observation,
-  /// with respect to the shared errors and to the errors of each lamp.
+  /// Matrix of derivatives G: of the first `States` states of a fix, or of the residuals of an
+  /// observation. They are with respect to the shared errors and to the errors of each lamp.
   template <int States>
   struct GainMatrix {
     using SharedGain = Eigen::Matrix<double, States, Eigen::Dynamic, Eigen::ColMajor, States, 20>;
@@ -157,8 +157,8 @@ class CommonErrors {
   int num_lamps_moved_since_calibration_ = 0;
 };
 
-/// Computes the expected contribution of the common errors to chi-squared, from their covariances
-/// of the residuals and from their covariance `common` = G C G' of the states:
+/// Computes the expected contribution of the common errors to chi-squared, from the covariances of
+/// the residuals that they cause. Their covariance of the states is `common` = G C G':
 ///   tr(R C R') = tr(W J_c C J_c') - tr((N + 2 P) common),   R = W^1/2 (J_c - J G)
 /// with N = J' W J and the information P of the priors.
 double compute_expected_chi_squared(const CommonErrors::Observations& observations,

@@ -26,9 +26,9 @@ struct ImageFix {
 using DetectionInPlane =
     std::function<std::vector<Detection>(const std::optional<Eigen::Matrix3d>& level_from_camera)>;
 
-/// Computes the fix of an image. If roll and pitch are estimated, repeats the detection of lamps in
-/// the plane that is level by the fix, until the fix moves by less than a tenth of its standard
-/// deviations.
+/// Computes the fix of an image. If roll and pitch are estimated, repeats the detection of the
+/// lamps with the level plane of the fix. Ends when the fix moves by less than a tenth of its
+/// standard deviations.
 ///
 /// Reason: lamps are discs in the level plane, and centers detected in another plane are biased. If
 /// the tilt may be large or no fix exists yet, the first repetition fits ellipses. They are close

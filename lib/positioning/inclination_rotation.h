@@ -8,9 +8,9 @@
 
 namespace vlp {
 
-/// Computes the rotation to the level frame from the base, the camera frame after correction of its
-/// calibrated tilt, from the readings about the robot's axes and the yaw of the camera on the
-/// robot:
+/// Computes the rotation to the level frame from the base, which is the camera frame after
+/// correction of its calibrated tilt. `inclination` is about the robot's axes, `yaw_in_robot_rad`
+/// the yaw of the camera relative to the robot.
 ///   level_from_base = Rz(-yaw_in_robot) Ry(pitch) Rx(roll) Rz(yaw_in_robot)
 Eigen::Matrix3d compute_level_from_base(const Inclination& inclination, double yaw_in_robot_rad);
 

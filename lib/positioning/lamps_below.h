@@ -13,7 +13,8 @@ namespace vlp {
 
 Inclination rotate_upside_down(const Inclination& inclination);
 CameraMount rotate_upside_down(const CameraMount& mount);
-/// Rotates the positions of the lamps. Shapes are unchanged.
+/// Rotates the positions of the lamps by 180 degrees about the world's x axis. Shapes are
+/// unchanged.
 LampMap rotate_upside_down(LampMap map);
 /// Rotates positions and errors of the lamps; the rest refers to the camera.
 Calibration rotate_upside_down(Calibration calibration);

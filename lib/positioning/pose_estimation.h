@@ -33,9 +33,9 @@
 /// lamps determine all three.
 namespace vlp {
 
-/// Prior of the state in which the height is that of a point of the body. By default, the pose is
-/// unknown, and the body is level and at rest. Motion with variance 0, and roll and pitch, are
-/// fixed at their mean; other states with variance 0 have a standard deviation of 1e-9.
+/// Prior of the state of a body; its height is that of a given point of the body. By default, the
+/// pose is unknown, and the body is level and at rest. A variance of 0 fixes motion, roll and pitch
+/// at their mean. Other states with variance 0 get a standard deviation of 1e-9.
 struct BodyPrior : StatePrior {
   /// Position in the body frame, m.
   Eigen::Vector3d height_point_m{0, 0, 0};
@@ -105,8 +105,8 @@ class EvaluatedState {
   Eigen::Vector3d pitch_axis;
 };
 
-/// Position q of a lamp relative to the camera along the axes of the body, m, its derivatives with
-/// respect to all states, and its velocity dq/dt.
+/// Position q of a lamp relative to the camera along the axes of the body, m. With its derivatives
+/// with respect to all states, and its velocity dq/dt.
 struct LinearizedLampPosition {
   Eigen::Vector3d q, velocity_m_per_s;
   Eigen::Matrix<double, 3, kBodyStates> jacobian;

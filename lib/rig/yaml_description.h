@@ -24,7 +24,7 @@ namespace vlp {
 /// a value, or are passed on to describe() of a mapping. describe() is found by its arguments:
 /// declare it in the namespace of the type, in a source file as static.
 
-/// The described object: constant when it is written.
+/// Reference to the described object: to a constant if it is written, otherwise to a variable.
 template <typename Io, typename T>
 using Described = std::conditional_t<Io::is_reader, T&, const T&>;
 

@@ -17,8 +17,8 @@ namespace vlp {
 /// Captures with a known position, as input of run_dispersion_step().
 struct KnownPositions {
   std::vector<ReferencePointCapture> captures;
-  /// For each capture, in the order of `captures`: states whether its known position is that of the
-  /// camera or that of the axis of rotation. As many as `captures`.
+  /// Point whose position is known, the camera or the axis of rotation, for each capture, in the
+  /// order of `captures`.
   std::vector<MeasuredPoint> measured_points = {};
   /// Number of captures without a known position; they are not in `captures`.
   std::size_t captures_without_position = 0;

@@ -16,8 +16,8 @@ namespace vlp {
 /// Result of evaluate_with_truth().
 struct EvaluateResult : StepResult {
   Evaluation evaluation;
-  /// Caution to be shown with the verdict, one line: captures have no fix, and no gate limits their
-  /// fraction. Empty if there is none.
+  /// Warning to be shown next to the verdict, one line, if captures have no fix and no gate limits
+  /// their fraction; otherwise empty.
   std::string caution;
 };
 

@@ -15,16 +15,19 @@ struct NoiseScale {
   double factor = 1, degrees_of_freedom = 0;
 };
 
-/// Estimates the pixel noise from the residuals of fixes beside the stated errors of the lamp map
-/// and of the tilt, which all fixes share: maximum likelihood of the variance s of the noise, with
-/// these errors e as normally distributed unknowns.
+/// Estimates the pixel noise from the residuals of fixes. The reported errors of the lamp map and
+/// of the tilt, which all fixes share, are not part of it: maximum likelihood of the variance s of
+/// the noise, with these errors e as normally distributed unknowns.
 ///   r = P (n + G e),   n ~ N(0, s),   e ~ N(0, 1)
 ///   s = |r - P G e(s)|^2 / (N - sum_k l_k / (l_k + s))
-/// r are whitened residuals, P removes the directions of the states of each fix, G are derivatives
-/// with respect to the errors in their standard deviations, N is the number of residuals after P,
-/// and l_k are the eigenvalues of G'PG. Source: MacKay, "Bayesian Interpolation", Neural
-/// Computation 4, 415, 1992. Few residuals do not separate noise from these errors: s is then at
-/// least a quarter of |r|^2 / N.
+/// with
+///   r    whitened residuals
+///   P    projector that removes the directions of the states of each fix
+///   G    derivatives with respect to the errors, in their standard deviations
+///   N    number of residuals after P
+///   l_k  eigenvalues of G'PG
+/// Source: MacKay, "Bayesian Interpolation", Neural Computation 4, 415, 1992. Few residuals do not
+/// separate noise from these errors: s is then at least a quarter of |r|^2 / N.
 ///
 /// Excludes fixes with a reduced chi-squared above 25 times the median. Errors of lamps without
 /// sd_m, and of the lens, count as noise.

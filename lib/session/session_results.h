@@ -18,9 +18,9 @@ struct StepOutputs {
   std::vector<std::string> files;
 };
 
-/// Writes junit.xml with an error in place of that of an earlier run, for a run that is refused
-/// before its first step, also in the results of another session, which CI would read as those of
-/// this run. Leaves a folder unchanged that is in use, or that holds no results of a session.
+/// Writes junit.xml with an error, for a run that is refused before its first step. It replaces the
+/// junit.xml of an earlier run, also of another session: CI would read it as the result of this
+/// run. A folder that is in use, or holds no results of a session, is not changed.
 void write_refusal_junit(const std::filesystem::path& results, const std::filesystem::path& session,
                          const std::string& message);
 

@@ -23,8 +23,8 @@ struct CornerLamps {
   LampMap map;
   /// Corners of each view; every n-th one if a fix does not take all of them.
   std::vector<Frame> frames;
-  /// Number of corners in `frames`, of those among them without a standard deviation, and of those
-  /// left out so that a view has at most Positioner::max_lamps.
+  /// Numbers of corners: `corners` are in `frames`, `corners_without_sd` of these have no standard
+  /// deviation. `left_out` others would exceed Positioner::max_lamps of a view.
   std::size_t corners = 0, corners_without_sd = 0, left_out = 0;
   /// Standard deviation of corners that state none; std::nullopt if it is not given and there are
   /// too few corners to estimate it.

@@ -15,7 +15,7 @@ namespace vlp {
 /// Part of the uncertainty of a lens that comes from the choice of its model
 /// (combine_model_fits()).
 struct ModelUncertainty {
-  /// Model with the largest D_m^2 - s_m^2.
+  /// Model m with the largest D_m^2 - s_m^2, see combine_model_fits().
   LensModel model;
   /// Covariance of the intrinsics, in the order of the lens model. Its rank is at most the number
   /// of the other models.
@@ -43,7 +43,8 @@ std::vector<IntrinsicsSolution> list_plausible_model_fits(const IntrinsicsSoluti
 ///            models k with larger D_k^2 - s_k^2
 /// the variance at v is the sum of w_m l_m(v)^2, where l_m(v) is the larger length of the
 /// displacements from c to m and from m to c. The covariance of the intrinsics is the sum of
-/// w_m i_m i_m', where the change i_m causes d_m by least squares over v, with a rotation free.
+/// w_m i_m i_m'. The change i_m of the intrinsics causes d_m by least squares over v, with a free
+/// rotation.
 ///
 /// The weight w_m is the smallest one with which noise and models together cover the difference to
 /// m as one standard deviation. For the first model it is 1 - s_m^2 / D_m^2, which removes what

@@ -46,13 +46,13 @@ struct ViewEquations {
 /// by a relative 1 / sqrt(2 (n - 1)), and often too large.
 Eigen::MatrixXd jackknife_covariance(const ViewEquations& equations);
 
-/// Estimates the mean squared residual per axis of each view, px^2, for the lens of the views
-/// outside its block, to first order, with the pose of the view fitted. View i of n is in block
-/// i blocks / n, rounded down.
+/// Estimates the mean squared residual per axis of each view, px^2, for a lens that is solved
+/// without the block of the view, to first order. The pose of the view is fitted. View i of n is in
+/// block i blocks / n, rounded down.
 ///
-/// With the normal matrix N and gradient g of view v and the change d = (sum of N outside the
-/// block) \ (sum of g in the block) of lens and warp, its sum of squares changes by 2 d' g + d' N
-/// d.
+/// Without the block, lens and warp change by d = (sum of N outside the block)^-1 (sum of g in the
+/// block), with the normal matrix N and the gradient g of each view. The sum of squares of the view
+/// changes by 2 d' g + d' N d.
 /// @return infinity for a view if the views outside its block do not determine a lens
 std::vector<double> compute_left_out_squares_px2(const ViewEquations& equations,
                                                  std::size_t blocks);

@@ -89,8 +89,7 @@ struct MapErrorOptions {
 /// @return             no errors if too few captures tie the lamps together
 ///
 /// Tests the displacements x of the lamps in an adjustment with exact lens and heights
-/// (adjust_bundle(), MapPrior::heights), of lamps that two captures contain with two
-/// others:
+/// (adjust_bundle(), MapPrior::heights). Each of these lamps is in two captures with two others:
 ///   x = P (d + m) + e
 ///   P  projector onto the displacements that are no similarity of the map
 ///   d  offsets of k lamps

@@ -106,9 +106,9 @@ struct BoardDetection {
   int num_overexposed_tags = 0;
   /// Points sorted by index, of boards of squares and from files of corners without tags.
   std::vector<PointDetection> points = {};
-  /// Number of squares along width and height of the largest part of a chessboard, with the board's
-  /// longer side first or second as on the board. {0, 0} if the chessboard is detected completely,
-  /// if no part of one is, and for other boards.
+  /// Number of squares along width and height of the largest detected part of a chessboard. The
+  /// longer side of the board comes first if it does in the board. {0, 0} if the chessboard is
+  /// detected completely, if no part of it is, and for other boards.
   std::array<int, 2> largest_chessboard_part = {0, 0};
   /// Negative log-likelihood of the edges of tags for the tone curves of kGammas, up to a constant.
   /// Only the first two if the image certainly has no tone curve. Empty if no edges are fitted, or

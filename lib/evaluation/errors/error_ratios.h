@@ -14,8 +14,8 @@ namespace vlp {
 /// Normalized errors: root mean square of error / reported standard deviation. 1 if the reported
 /// values are correct, whatever their correlations; above 1 if errors are larger than reported.
 struct NormalizedErrors {
-  /// Root mean square of error / reported standard deviation, over x and y of `fixes` fixes. These
-  /// are the fixes whose reported standard deviations are all positive.
+  /// Root mean square of error / reported standard deviation, over the x and y of all fixes whose
+  /// reported standard deviations are positive. Their number is `fixes`.
   double horizontal;  // of x and y
   std::size_t fixes;
   std::optional<double> height, yaw;

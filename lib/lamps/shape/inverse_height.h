@@ -8,16 +8,16 @@
 
 namespace vlp {
 
-/// Lamp in an image: its approximate position in the level plane at height 1, its position in the
-/// map, its height beyond the first lamp of the map, seen from the camera, and the standard
-/// deviation of the position in the image per axis, in meters at the lamp.
+/// Lamp in an image: its approximate position in the level plane at height 1, and its position in
+/// the map. `height_beyond_first_m` is its distance behind the first lamp of the map, seen from the
+/// camera; `center_sd_m` the standard deviation of its center per axis, in meters at the lamp.
 struct LampInPlane {
   Eigen::Vector2d position_in_plane, position_m;
   double height_beyond_first_m, center_sd_m;
 };
 
-/// Radius of a lamp in the level plane at height 1 and in the map, and its height beyond the first
-/// lamp of the map, seen from the camera.
+/// Radius of a lamp in the level plane at height 1 and in the map, m. `height_beyond_first_m` as in
+/// LampInPlane.
 struct LampRadius {
   double radius_in_plane, radius_m, height_beyond_first_m;
 };

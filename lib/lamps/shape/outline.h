@@ -11,9 +11,9 @@
 
 namespace vlp {
 
-/// Returns the points (column, row) at both ends of each run of a blob where the level passes half
-/// of that inside, the column with a fraction. The level inside is the upper quartile of the run:
-/// the halo around a light changes it little.
+/// Returns two points (column, row) of the outline for each run of a blob: at its ends, where the
+/// level falls to half of the level inside. Columns are interpolated. The level inside is the upper
+/// quartile of the run, which the halo around a light changes little.
 ///
 /// Excludes ends at the image border, runs shorter than 8 px, and runs with less than 35 % of the
 /// level of the brightest run, such as halos and the charge that a saturated lamp spills between

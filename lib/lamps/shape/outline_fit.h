@@ -46,10 +46,10 @@ struct KnownRadius {
   /// outline.
   bool is_radius_of(const MeasuredLight& light) const;
 
-  /// Returns true if this prior differs from the radius of a light by more than two standard
-  /// deviations, would move its center by more than a tenth of its standard deviation, or would
-  /// reduce the variance of the center by more than a tenth. True for rims, whose size depends on
-  /// the reflector; false without a lens.
+  /// Returns true if a fit with this prior would be another one, for one of three reasons. Its
+  /// radius differs from that of the light by more than two standard deviations. Its center moves
+  /// by more than a tenth of its standard deviation. Its variance falls by more than a tenth. True
+  /// for rims, whose size depends on the reflector; false without a lens.
   bool improves_fit(const MeasuredLight& light) const;
 };
 
@@ -70,12 +70,12 @@ struct KnownRadius {
 ///
 /// The unknowns are center, size, blur, tone, and without a lens the ovality. They are estimated by
 /// variable projection (Golub and Pereyra 1973; Kaufman 1975), from a wide blur to the actual one.
-/// Tukey's biweight applies to cells. The variance of a pixel is that of the background plus a
-/// multiple of the level, which is estimated from the residuals of cells with contrast, plus 0.1
-/// for quantization and the square of 0.3 % of the level.
+/// Tukey's biweight applies to cells. The variance of a pixel is the sum of that of the background,
+/// of a multiple of the level, of 0.1 for quantization, and of the square of 0.3 % of the level.
+/// The multiple is estimated from the residuals of cells with contrast.
 ///
-/// The covariance of the center is that of the normal equations, scaled by the larger one of the
-/// mean square of the residuals and the power of the 3rd to 8th harmonic of the residuals along the
+/// The covariance of the center is that of the normal equations times a factor. The factor is the
+/// mean square of the residuals or, if larger, the power of their 3rd to 8th harmonic along the
 /// outline. If the levels inside vary, the variance includes the square of the shift of the center
 /// in a narrower band.
 ///

@@ -31,8 +31,8 @@ std::vector<PixelRun> list_chords_in_ellipse(const Eigen::Vector2d& low,
                                              const Eigen::Vector2d& high, const ImageSize& size);
 
 /// Computes the level of each chord of a light above `dark`. Suppresses partial occlusion and
-/// specks: the level is that of the second brightest of five parts, or of the second darkest one if
-/// the light has a bright core, whose level varies between the scanlines.
+/// specks: the level is that of the second brightest of five parts of the chord. With a bright
+/// core, whose level varies between the scanlines, it is that of the second darkest part.
 std::vector<double> compute_scanline_signal(const ImageView& image,
                                             const std::vector<PixelRun>& chords, double dark,
                                             bool has_bright_core = false);
