@@ -24,12 +24,12 @@ constexpr double kMinResidual_px = 0.2;
 
 /// Returns names of images with runs of successive captures joined: "0000.png to 0004.png,
 /// 0010.png". A capture that is not listed ends a run.
-std::string join_images(const std::vector<CaptureError>& captures) {
+std::string join_images(const std::vector<CaptureName>& captures) {
   constexpr std::size_t max_groups = 5;
   std::vector<std::string> groups;
   for (std::size_t begin = 0; begin < captures.size();) {
     std::size_t end = begin + 1;
-    while (end < captures.size() && captures[end].capture == captures[end - 1].capture + 1) ++end;
+    while (end < captures.size() && captures[end].index == captures[end - 1].index + 1) ++end;
     groups.push_back(captures[begin].image);
     if (end > begin + 1) {
       groups.back().append(end > begin + 2 ? " to " : ", ").append(captures[end - 1].image);
@@ -44,24 +44,27 @@ std::string join_images(const std::vector<CaptureError>& captures) {
 
 /// Captures with gross errors, and the errors of all and of the other captures.
 struct Outliers {
-  std::vector<CaptureError> captures;
+  std::vector<CaptureName> captures;
   double max = 0;
   std::vector<double> all, others;
 };
 
-/// Finds the errors of at least `min_size` and kMinRatio times the median; none among few errors.
-Outliers collect_outliers(const std::vector<CaptureError>& errors, double min_size) {
+/// Collects the captures whose `value` is at least `min_value` and kMinRatio times the median; none
+/// of few captures.
+template <typename Measured>
+Outliers collect_outliers(const std::vector<Measured>& measured, double Measured::*value,
+                          double min_value) {
   Outliers found;
-  if (errors.size() < kMinErrors) return found;
-  for (const CaptureError& error : errors) found.all.push_back(error.size);
-  const double limit = std::max(min_size, kMinRatio * upper_median(found.all));
-  for (const CaptureError& error : errors) {
-    if (error.size < limit) {
-      found.others.push_back(error.size);
+  if (measured.size() < kMinErrors) return found;
+  for (const Measured& each : measured) found.all.push_back(each.*value);
+  const double limit = std::max(min_value, kMinRatio * upper_median(found.all));
+  for (const Measured& each : measured) {
+    if (each.*value < limit) {
+      found.others.push_back(each.*value);
       continue;
     }
-    found.captures.push_back(error);
-    found.max = std::max(found.max, error.size);
+    found.captures.push_back(each.capture);
+    found.max = std::max(found.max, each.*value);
   }
   return found;
 }
@@ -90,7 +93,7 @@ std::vector<PositionError> list_position_errors(const EvaluationInput& input) {
 std::string describe_wrong_positions(const EvaluationInput& input) {
   std::vector<CaptureError> errors;
   for (const PositionError& error : list_position_errors(input)) {
-    errors.push_back({input.fixes.rows[error.fix].image, error.horizontal_m.norm(), error.fix});
+    errors.push_back({{input.fixes.rows[error.fix].image, error.fix}, error.horizontal_m.norm()});
   }
   return describe_error_outliers(errors);
 }
@@ -144,8 +147,8 @@ std::string describe_common_offset(const CommonOffset& offset) {
           : "the known points or the lamps have moved");
 }
 
-std::string describe_error_outliers(const std::vector<CaptureError>& errors_m) {
-  const Outliers outliers = collect_outliers(errors_m, kMinOutlierError_m);
+std::string describe_error_outliers(const std::vector<CaptureError>& errors) {
+  const Outliers outliers = collect_outliers(errors, &CaptureError::error_m, kMinOutlierError_m);
   if (outliers.captures.empty()) return "";
   const double max_mm = kMmPerM * outliers.max, others_mm = kMmPerM * upper_median(outliers.others);
   if (outliers.captures.size() == 1) {
@@ -162,14 +165,15 @@ std::string describe_error_outliers(const std::vector<CaptureError>& errors_m) {
 }
 
 void add_residual(const Fix& fix, const std::string& image, std::size_t capture,
-                  std::vector<CaptureError>& residuals_px) {
+                  std::vector<CaptureResidual>& residuals) {
   constexpr int min_lamps = 3;
   if (fix.has_succeeded() && fix.lamps >= min_lamps)
-    residuals_px.push_back({image, fix.residual_px, capture});
+    residuals.push_back({{image, capture}, fix.residual_px});
 }
 
-std::string describe_residual_outliers(const std::vector<CaptureError>& residuals_px) {
-  const Outliers outliers = collect_outliers(residuals_px, kMinResidual_px);
+std::string describe_residual_outliers(const std::vector<CaptureResidual>& residuals) {
+  const Outliers outliers =
+      collect_outliers(residuals, &CaptureResidual::residual_px, kMinResidual_px);
   if (outliers.captures.size() < 2) return "";
   return fmt::format(
       "the lamps in captures {} do not fit lens and tilt of the others (residuals up to {:.2f} px, "

@@ -17,20 +17,29 @@ namespace vlp {
 /// Smaller horizontal errors at known points are no fault of the captures: a camera may have them.
 inline constexpr double kMinOutlierError_m = 0.005;
 
-/// Error of one capture. `size` is the horizontal error of its fix at a known point, m, or the RMS
-/// residual of its lamps in the image, px. The function that takes it determines which.
-struct CaptureError {
+/// Capture of a folder: its image, and its index among all captures of the folder.
+struct CaptureName {
   std::string image;
-  double size;
-  /// Index of the capture in the folder, which may have captures without an error.
-  std::size_t capture = 0;
+  std::size_t index = 0;
+};
+
+/// Horizontal error of the fix of a capture at a known point, m.
+struct CaptureError {
+  CaptureName capture;
+  double error_m;
+};
+
+/// RMS residual of the lamps in the image of a capture, px.
+struct CaptureResidual {
+  CaptureName capture;
+  double residual_px;
 };
 
 /// Describes captures that were taken elsewhere than their table says, or by another camera, in one
 /// line: their errors are gross outliers of the others, more than 5 mm and 8 times the median.
 /// Returns an empty string if there are none, and for fewer than five errors. Outliers are fewer
 /// than half, because the median is typical of the others.
-std::string describe_error_outliers(const std::vector<CaptureError>& errors_m);
+std::string describe_error_outliers(const std::vector<CaptureError>& errors);
 
 /// Describes captures that were not taken at their true positions (describe_error_outliers()), from
 /// fixes of three lamps or more: others may have large errors at the edge of a room. Returns an
@@ -63,12 +72,12 @@ std::string describe_common_offset(const CommonOffset& offset);
 /// Adds the RMS residual of a fix from three lamps or more, as input of
 /// describe_residual_outliers().
 void add_residual(const Fix& fix, const std::string& image, std::size_t capture,
-                  std::vector<CaptureError>& residuals_px);
+                  std::vector<CaptureResidual>& residuals);
 
 /// Describes captures whose lamps do not fit the lens and tilt of the others, in one line: two
 /// captures or more have residuals above 0.2 px and 8 times the median. A single one may show a
 /// covered lamp or a reflection. Returns an empty string if there are none, for fewer than five
 /// residuals, and if they are half of the captures or more.
-std::string describe_residual_outliers(const std::vector<CaptureError>& residuals_px);
+std::string describe_residual_outliers(const std::vector<CaptureResidual>& residuals);
 
 }  // namespace vlp

@@ -190,12 +190,12 @@ std::optional<JointCovariance> compute_joint_covariance(DispersionResult& result
 void find_inconsistent_captures(DispersionResult& result, const KnownPositions& places,
                                 const LampMap& lamps) {
   const Positioner positioner(lamps, result.calibration);
-  std::vector<CaptureError> residuals_px;
+  std::vector<CaptureResidual> residuals;
   for (std::size_t i = 0; i < places.captures.size(); ++i) {
     const ReferencePointCapture& capture = places.captures[i];
-    add_residual(locate_capture(positioner, capture), capture.image, i, residuals_px);
+    add_residual(locate_capture(positioner, capture), capture.image, i, residuals);
   }
-  result.set_inconsistent_captures(describe_residual_outliers(residuals_px));
+  result.set_inconsistent_captures(describe_residual_outliers(residuals));
 }
 
 void warn_about_few_captures(DispersionResult& result, DispersionMethod method) {

@@ -67,7 +67,7 @@ std::vector<AssignedLight> assigned_lights(const GroupedLights& image,
                                            const LampMap& lamps) {
   std::vector<AssignedLight> assigned;
   for (std::size_t i = 0; i < image.lights.size(); ++i) {
-    const std::vector<int>& ids = candidate.lamps[image.lights[i].group];
+    const std::vector<int>& ids = candidate.lamps[image.lights[i].period_group];
     if (!ids.empty()) assigned.push_back({i, find_lamp_by_id(lamps.lamps, ids.front())});
   }
   return assigned;
@@ -161,14 +161,15 @@ std::vector<double> compute_position_costs(const RowTimeCandidates& found,
   std::vector<std::vector<std::vector<double>>> squares(
       found.candidates.size(), std::vector<std::vector<double>>(found.groups.size()));
   for (GroupedLights image : images) {
-    std::erase_if(image.lights, [&](const GroupedLight& light) { return !unique[light.group]; });
+    std::erase_if(image.lights,
+                  [&](const GroupedLight& light) { return !unique[light.period_group]; });
     if (image.lights.size() < kMinLights) continue;
     const Lens lens_of_image = lens ? *lens : make_nominal_lens(image.size_px);
     for (std::size_t i = 0; i < squares.size(); ++i) {
       const auto of_lights =
           square_light_residuals(image, found.candidates[i], lamps, lens_of_image, tolerance);
       for (std::size_t k = 0; k < of_lights.size(); ++k) {
-        squares[i][image.lights[k].group].push_back(of_lights[k]);
+        squares[i][image.lights[k].period_group].push_back(of_lights[k]);
       }
     }
   }

@@ -17,8 +17,8 @@ namespace vlp {
 
 /// Light in an image, with the group of equal stripe periods to which it belongs.
 struct GroupedLight {
-  /// Index in RowTimeCandidates::groups of the period group to which the light belongs.
-  std::size_t group;
+  /// Index in RowTimeCandidates::groups of the lights with this stripe period.
+  std::size_t period_group;
   Eigen::Vector2d pixel;
   double sigma_px;
 };

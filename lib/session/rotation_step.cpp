@@ -166,12 +166,12 @@ MapErrors detect_errors_in_map(const LampCaptures& input, const Calibration& cal
 /// Finds captures that do not fit the result, by the residuals of their fixes.
 void find_inconsistent_captures(RotationResult& result, const LampCaptures& input) {
   const Positioner positioner(input.lamps, result.calibration);
-  std::vector<CaptureError> residuals_px;
+  std::vector<CaptureResidual> residuals;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
     const Frame& frame = input.frames[i];
-    add_residual(positioner.compute_position_fix(frame.detections), frame.image, i, residuals_px);
+    add_residual(positioner.compute_position_fix(frame.detections), frame.image, i, residuals);
   }
-  result.set_inconsistent_captures(describe_residual_outliers(residuals_px));
+  result.set_inconsistent_captures(describe_residual_outliers(residuals));
 }
 
 /// Smallest offset of a lamp that can make a step fail, as seen in the image.

@@ -22,9 +22,9 @@ using testing::HasSubstr;
 std::vector<CaptureError> errors_with(const std::vector<std::size_t>& indices) {
   std::vector<CaptureError> errors;
   for (int i = 0; i < 36; ++i) {
-    errors.push_back({std::to_string(100 + i), 5e-5, static_cast<std::size_t>(i)});
+    errors.push_back({{std::to_string(100 + i), static_cast<std::size_t>(i)}, 5e-5});
   }
-  for (const std::size_t index : indices) errors[index].size = 0.052;
+  for (const std::size_t index : indices) errors[index].error_m = 0.052;
   return errors;
 }
 
@@ -43,28 +43,28 @@ TEST(DescribeErrorOutliers, NamesConsecutiveCapturesAsRanges) {
 TEST(DescribeErrorOutliers, ReturnsEmptyTextWithoutGrossOutliers) {
   EXPECT_EQ(describe_error_outliers(errors_with({})), "");
   auto errors = errors_with({});
-  errors[3].size = 0.004;
+  errors[3].error_m = 0.004;
   EXPECT_EQ(describe_error_outliers(errors), "") << "a camera may have it";
-  for (CaptureError& error : errors) error.size = 0.05;
+  for (CaptureError& error : errors) error.error_m = 0.05;
   EXPECT_EQ(describe_error_outliers(errors), "") << "all of them";
-  EXPECT_EQ(describe_error_outliers({{"a", 1e-5}, {"b", 1}, {"c", 1e-5}}), "") << "too few";
+  EXPECT_EQ(describe_error_outliers({{{"a"}, 1e-5}, {{"b"}, 1}, {{"c"}, 1e-5}}), "") << "too few";
 }
 
 TEST(DescribeResidualOutliers, NamesCapturesOnlyWhenAtLeastTwoAreOutliers) {
-  std::vector<CaptureError> residuals;
+  std::vector<CaptureResidual> residuals;
   residuals.reserve(24);
-  for (std::size_t i = 0; i < 24; ++i) residuals.push_back({std::to_string(100 + i), 0.02, i});
+  for (std::size_t i = 0; i < 24; ++i) residuals.push_back({{std::to_string(100 + i), i}, 0.02});
   EXPECT_EQ(describe_residual_outliers(residuals), "");
-  residuals[3].size = 0.5;
+  residuals[3].residual_px = 0.5;
   EXPECT_EQ(describe_residual_outliers(residuals), "") << "a covered lamp";
-  residuals[4].size = 0.19;
+  residuals[4].residual_px = 0.19;
   EXPECT_EQ(describe_residual_outliers(residuals), "") << "one camera may have it";
-  residuals[4].size = 0.3;
+  residuals[4].residual_px = 0.3;
   EXPECT_EQ(
       describe_residual_outliers(residuals),
       "the lamps in captures 103, 104 do not fit lens and tilt of the others (residuals up to 0.50 "
       "px, typically 0.02 px): other camera, or covered lamps; repeat these captures");
-  for (CaptureError& each : residuals) each.size = 0.3;
+  for (CaptureResidual& each : residuals) each.residual_px = 0.3;
   EXPECT_EQ(describe_residual_outliers(residuals), "") << "all of them";
 }
 

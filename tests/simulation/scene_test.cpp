@@ -235,7 +235,7 @@ TEST(ReadSceneFile, ReadsForeignLightsMirrorsBlindsAndSigns) {
   EXPECT_EQ(clutter.ambient_flicker->depth, 0.6);
 }
 
-TEST(ReadSceneFile, ReadsRandomChipsAndRecessExponents) {
+TEST(ReadSceneFile, ReadsRandomLedChips) {
   const Scene chips = read_scene_text(scene_with("rim_to_center_ratio: 0.8}",
                                                  "rim_to_center_ratio: 0.8, random_chips: {count: "
                                                  "7, sigma_fraction: 0.12, within_fraction: 0.75, "
@@ -244,6 +244,9 @@ TEST(ReadSceneFile, ReadsRandomChipsAndRecessExponents) {
   EXPECT_EQ(chips.lamps[0].glow.random_chips->within_fraction, 0.75);
   EXPECT_EQ(chips.lamps[0].glow.random_chips->max_excess, 0.8);
   EXPECT_EQ(chips.lamps[0].glow.hot_spots.size(), 7U) << "drawn";
+}
+
+TEST(ReadSceneFile, ReadsExponentsOfRecess) {
   const Scene recess = read_scene_text(scene_with(
       "depth_m: 0.07,",
       "depth_m: 0.07, source_power: 1.5, rim_power: 6, beam_power: 7, far_side_slope: 0.06,"));
