@@ -35,7 +35,7 @@ std::string_view outline_name(const Light& light) {
 }
 
 template <typename Names, typename Enumerator>
-std::string_view find_name(const Names& names, Enumerator enumerator) {
+std::string_view enumerator_name(const Names& names, Enumerator enumerator) {
   return std::ranges::find(names, enumerator, &Names::value_type::first)->second;
 }
 
@@ -78,7 +78,7 @@ std::string_view light_kind_name(LightKind kind) {
        {LightKind::unknown, "unknown"},
        {LightKind::unmodulated, "steady"},
        {LightKind::no_outline, "no_outline"}}};
-  return find_name(names, kind);
+  return enumerator_name(names, kind);
 }
 
 std::string_view light_reason_name(LightReason reason) {
@@ -106,7 +106,7 @@ std::string_view light_reason_name(LightReason reason) {
        {LightReason::wrong_shape, "wrong_shape"},
        // [LAMP-9] `incomplete` | not wholly in view, or too small | aim at it, or go nearer
        {LightReason::incomplete, "incomplete"}}};
-  return find_name(names, reason);
+  return enumerator_name(names, reason);
 }
 
 std::string describe_light_reason(LightReason reason) {

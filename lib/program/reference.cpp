@@ -29,7 +29,7 @@ Options collect_options(const CLI::App& app) {
 Options collect_positionals(const CLI::App& app) {
   return app.get_options([](const CLI::Option* option) { return option->get_positional(); });
 }
-std::vector<const CLI::App*> find_commands(const CLI::App& app) {
+std::vector<const CLI::App*> list_commands(const CLI::App& app) {
   return app.get_subcommands(std::function<bool(const CLI::App*)>(
       [](const CLI::App* command) { return !command->get_name().empty(); }));
 }
@@ -196,7 +196,7 @@ std::string format_zsh_option(const CLI::Option& option) {
 }
 
 std::string format_zsh_arguments(const CLI::App& app, const std::string& indent) {
-  std::string text = indent + "_arguments -s" + (find_commands(app).empty() ? "" : " -C");
+  std::string text = indent + "_arguments -s" + (list_commands(app).empty() ? "" : " -C");
   for (const CLI::Option* option : collect_options(app)) {
     text.append(" \\\n").append(indent).append("  ").append(format_zsh_option(*option));
   }
@@ -222,13 +222,13 @@ std::string format_manual_page(const CLI::App& app) {
   for (const CLI::Option* option : collect_positionals(app)) {
     page.append(" ").append(escape_roff(formatter.make_option_usage(option)));
   }
-  page.append(find_commands(app).empty() ? "\n" : " COMMAND ...\n");
+  page.append(list_commands(app).empty() ? "\n" : " COMMAND ...\n");
   page.append(".SH DESCRIPTION\n").append(format_roff_paragraphs(app.get_description(), false));
   if (!collect_positionals(app).empty()) {
     page.append(".SH ARGUMENTS\n").append(format_roff_options(collect_positionals(app), true));
   }
   page.append(".SH OPTIONS\n").append(format_roff_options(collect_options(app), false));
-  for (const CLI::App* command : find_commands(app)) {
+  for (const CLI::App* command : list_commands(app)) {
     page.append(".SH COMMAND ").append(escape_roff(command->get_name())).append("\n");
     page.append(format_roff_paragraphs(command->get_description(), false));
     page.append(format_roff_options(collect_positionals(*command), true));
@@ -246,7 +246,7 @@ std::string format_manual_page(const CLI::App& app) {
 
 std::string format_bash_completion(const CLI::App& app) {
   const std::string function = make_function_name(app.get_name());
-  const auto commands = find_commands(app);
+  const auto commands = list_commands(app);
   const auto names = collect_names(commands);
   std::string text =
       "# Completion of " + app.get_name() + " for bash; made from its options.\n" + function +
@@ -284,7 +284,7 @@ std::string format_bash_completion(const CLI::App& app) {
 }
 
 std::string format_zsh_completion(const CLI::App& app) {
-  const auto commands = find_commands(app);
+  const auto commands = list_commands(app);
   std::string text = "#compdef " + app.get_name() + "\n# Made from its options.\n";
   if (commands.empty()) return text + format_zsh_arguments(app, "") + "\n";
   const auto names = collect_names(commands);

@@ -249,10 +249,10 @@ RunRecord make_final_record(Unit& unit, const std::string& run, const StationRun
   record.operator_name = options.operator_name;
   record.shift = options.shift;
   if (record.is_verdict_invalid()) return record;  // images of an invalid run may be used again
-  const auto earlier = spool.find_same_images(record);
-  if (earlier && !earlier->empty()) {
-    invalidate_reuse(record, *earlier, options.station);
-  } else if (!earlier) {
+  const Spool::SameImages earlier = spool.search_same_images(record);
+  if (earlier.run) {
+    invalidate_reuse(record, *earlier.run, options.station);
+  } else if (!earlier.is_complete) {
     // [STATION-1] `records are offline`
     const std::string unchecked =
         "the records are offline: whether an earlier run used the same images was not checked";

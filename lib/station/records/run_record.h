@@ -82,11 +82,10 @@ struct RunRecord {
   void invalidate_verdict(const std::string& reason);
 };
 
-/// Run that used an image; empty if none did.
+/// Run that used an image.
 struct ImageUser {
-  std::string camera = {}, run = {};
+  std::string camera, run;
 
-  bool has_no_run() const { return run.empty(); }
   friend bool operator==(const ImageUser&, const ImageUser&) = default;
 };
 

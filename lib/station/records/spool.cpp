@@ -261,32 +261,33 @@ std::optional<RunSummary> Spool::find_image_user(
   return std::nullopt;
 }
 
-ImageUser Spool::find_other_user(const std::string& sha256, const std::string& other_than_camera) {
+std::optional<ImageUser> Spool::find_other_user(const std::string& sha256,
+                                                const std::string& other_than_camera) {
   const auto run = find_image_user(sha256, [&](const RunSummary& user) {
     return user.camera != other_than_camera && user.voided.empty();
   });
-  return run ? ImageUser{run->camera, run->run} : ImageUser{};
+  return run ? std::optional(ImageUser{run->camera, run->run}) : std::nullopt;
 }
 
-std::string Spool::find_golden_user(const std::string& sha256) {
+std::optional<std::string> Spool::find_golden_user(const std::string& sha256) {
   const auto run = find_image_user(sha256, [](const RunSummary& user) {
     return user.kind == "golden" && user.verdict != verdict_name(Verdict::invalid);
   });
-  return run ? run->run : "";
+  return run ? std::optional(run->run) : std::nullopt;
 }
 
-std::optional<std::string> Spool::find_same_images(const RunRecord& run) {
+Spool::SameImages Spool::search_same_images(const RunRecord& run) {
   const auto first = std::ranges::find_if(run.images, &RunRecord::Image::is_image_used);
-  if (first == run.images.end()) return "";
+  if (first == run.images.end()) return {};
   auto [earlier_runs, has_answer] =
       merge_runs({.camera = run.camera, .kind = "unit", .image_sha256 = first->sha256}, name_);
   for (const RunSummary& earlier : earlier_runs) {
     if (earlier.verdict == verdict_name(Verdict::invalid) || !earlier.voided.empty()) continue;
     const auto record = find_run_by_id(earlier.run);
-    if (record && has_images_of(run, *record)) return earlier.run;
+    if (record && has_images_of(run, *record)) return {earlier.run, has_answer};
     has_answer = has_answer && record;
   }
-  return has_answer ? std::optional<std::string>("") : std::nullopt;
+  return {std::nullopt, has_answer};
 }
 
 }  // namespace vlp

@@ -87,17 +87,23 @@ class Spool {
   /// their end. Of a run in both, the waiting one counts: it has newer events. The causes of
   /// waiting runs contain a note that they wait.
   std::vector<RunSummary> list_run_summaries(const RunFilter& filter);
-  /// Returns the first run of another camera, not voided, that uses an image of this digest; empty
-  /// if none does. Searches all runs of the outbox and the records.
-  ImageUser find_other_user(const std::string& sha256, const std::string& other_than_camera);
-  /// Returns the first judged run of the same unit, not voided, that used all images of `run`
-  /// (has_images_of()). Searches the waiting runs and the records. Returns an empty
-  /// string if there is none, and std::nullopt if the records do not answer and no waiting run
-  /// matches.
-  std::optional<std::string> find_same_images(const RunRecord& run);
-  /// Returns the first judged run of a golden unit that uses an image of this digest; empty if none
-  /// does. Searches all runs of the outbox and the records.
-  std::string find_golden_user(const std::string& sha256);
+  /// Returns the first run of another camera, not voided, that uses an image of this digest.
+  /// Searches all runs of the outbox and the records.
+  std::optional<ImageUser> find_other_user(const std::string& sha256,
+                                           const std::string& other_than_camera);
+  /// Result of search_same_images().
+  struct SameImages {
+    /// Id of the first such run; std::nullopt if none was found.
+    std::optional<std::string> run = {};
+    /// False if the records did not answer, so that only the waiting runs were searched.
+    bool is_complete = true;
+  };
+  /// Searches the waiting runs and the records for a judged run of the same unit, not voided, that
+  /// used all images of `run` (has_images_of()).
+  SameImages search_same_images(const RunRecord& run);
+  /// Returns the first judged run of a golden unit that uses an image of this digest. Searches all
+  /// runs of the outbox and the records.
+  std::optional<std::string> find_golden_user(const std::string& sha256);
 
  private:
   Records open_outbox() const;

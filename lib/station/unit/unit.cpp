@@ -181,10 +181,10 @@ void Unit::process_files(StationStep step, const std::vector<fs::path>& files) {
     images[i].level = get_level_rotation(levels, images[i].observation.image_file_name());
   });
   for (UnitImage& image : images) {
-    const ImageUser owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : ImageUser();
-    if (!owner.has_no_run()) {
+    const auto owner = owner_ && !image.sha256.empty() ? owner_(image.sha256) : std::nullopt;
+    if (owner) {
       image.observation.reject(RejectionReason::used_elsewhere,
-                               "already of " + describe_image_user(owner, config_.file));
+                               "already of " + describe_image_user(*owner, config_.file));
     }
     mutable_step_state(step).last_image = image.observation.image_file_name();
     add_image_to_step(step, std::move(image));

@@ -59,7 +59,7 @@ class Unit {
   void solve_completed(bool all_in);
   /// Sets the function that finds another camera's run by the SHA-256 of an image. Such images are
   /// rejected.
-  void set_image_lookup(std::function<ImageUser(const std::string& sha256)> owner) {
+  void set_image_lookup(std::function<std::optional<ImageUser>(const std::string& sha256)> owner) {
     owner_ = std::move(owner);
   }
   /// Ends an incomplete unit: no more images arrive. `reason` is human-readable, as "the operator
@@ -117,7 +117,7 @@ class Unit {
   int threads_;
   std::optional<Calibration> known_calibration_;
   std::string ended_ = {}, invalid_reason_ = {};
-  std::function<ImageUser(const std::string&)> owner_ = {};
+  std::function<std::optional<ImageUser>(const std::string&)> owner_ = {};
   BoardIntake boards_;
   std::array<UnitStep, 4> steps_;
   RowTimeCheck row_time_ = {};

@@ -114,13 +114,13 @@ VerificationResult verify_from_images(const StationConfig& config, const fs::pat
 
 void invalidate_if_reused(
     RunRecord& record,
-    const std::function<std::string(const std::string& sha256)>& find_golden_user) {
+    const std::function<std::optional<std::string>(const std::string& sha256)>& find_golden_user) {
   for (const RunRecord::Image& image : record.images) {
     if (!image.rejection.empty()) continue;
-    const std::string run = find_golden_user(image.sha256);
-    if (run.empty()) continue;
+    const std::optional<std::string> run = find_golden_user(image.sha256);
+    if (!run) continue;
     record.invalidate_verdict(fmt::format("image {}/{} was used in golden run {}: measure it again",
-                                          image.step, image.name, run));
+                                          image.step, image.name, *run));
     return;
   }
 }

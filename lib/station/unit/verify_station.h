@@ -38,10 +38,10 @@ VerificationResult verify_from_images(const StationConfig& config,
                                       const ProgramVersion& program, int threads);
 
 /// Makes the record INVALID if an earlier run used one of its images, because the image does not
-/// show the current state of the station. `find_golden_user` returns the earlier run
-/// that used an image of this digest; empty if there is none.
+/// show the current state of the station. `find_golden_user` returns the earlier run that used an
+/// image of this digest.
 void invalidate_if_reused(
     RunRecord& record,
-    const std::function<std::string(const std::string& sha256)>& find_golden_user);
+    const std::function<std::optional<std::string>(const std::string& sha256)>& find_golden_user);
 
 }  // namespace vlp

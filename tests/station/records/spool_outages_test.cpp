@@ -361,7 +361,7 @@ TEST(Spool, DeliversAllRunsAfterServerStoppedDuringDelivery) {
   EXPECT_EQ(connected.describe_state(), "");
   server.freeze();
   EXPECT_LT(measure_seconds(
-                [&] { EXPECT_EQ(connected.find_other_user("digest-1-1", "b"), ImageUser{}); }),
+                [&] { EXPECT_EQ(connected.find_other_user("digest-1-1", "b"), std::nullopt); }),
             8);
   connected.store_run(numbered_run(-3));
   EXPECT_LT(measure_seconds([&] { connected.deliver_waiting(); }), 1);

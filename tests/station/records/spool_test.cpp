@@ -55,8 +55,9 @@ TEST(Spool, DeliversStoredRunsWhenRecordsBecomeReachable) {
   // Checks continue with the locally known runs.
   EXPECT_EQ(spool.find_other_user("digest-2-7", "camera-1"),
             (ImageUser{"camera-2", numbered_run(2).run}));
-  EXPECT_EQ(spool.find_other_user("digest-2-7", "camera-2"), ImageUser{});
+  EXPECT_EQ(spool.find_other_user("digest-2-7", "camera-2"), std::nullopt);
   EXPECT_THAT(spool.describe_state(), HasSubstr("; 1 images were not looked up in the records"));
+  EXPECT_FALSE(spool.search_same_images(numbered_run(4)).is_complete);
 
   fs::create_directory(folder / "away");
   Spool later(folder / "spool", where);
@@ -71,9 +72,9 @@ TEST(Spool, DeliversStoredRunsWhenRecordsBecomeReachable) {
   RunRecord voided_run = numbered_run(2);
   voided_run.events = {make_run_event_now(kVoided, "wrong serial", "Ann")};
   later.store_run(voided_run);
-  EXPECT_EQ(later.find_other_user("digest-2-7", "camera-1"), ImageUser{});
+  EXPECT_EQ(later.find_other_user("digest-2-7", "camera-1"), std::nullopt);
   later.deliver_waiting();
-  EXPECT_EQ(later.find_other_user("digest-2-7", "camera-1"), ImageUser{});
+  EXPECT_EQ(later.find_other_user("digest-2-7", "camera-1"), std::nullopt);
 }
 
 TEST(Spool, FindGoldenRunUsingImageReturnsOnlyJudgedGoldenRuns) {
@@ -87,15 +88,15 @@ TEST(Spool, FindGoldenRunUsingImageReturnsOnlyJudgedGoldenRuns) {
   for (const RunRecord& run : {numbered_run(0), golden, invalid}) spool.store_run(run);
   for (const std::string state : {"here", "in the records"}) {
     EXPECT_EQ(spool.find_golden_user("digest-1-7"), golden.run) << state;
-    EXPECT_EQ(spool.find_golden_user("digest-0-7"), "") << "of a unit, " << state;
-    EXPECT_EQ(spool.find_golden_user("digest-2-7"), "") << "not judged, " << state;
+    EXPECT_EQ(spool.find_golden_user("digest-0-7"), std::nullopt) << "of a unit, " << state;
+    EXPECT_EQ(spool.find_golden_user("digest-2-7"), std::nullopt) << "not judged, " << state;
     spool.deliver_waiting();
   }
   EXPECT_THAT(spool.list_waiting_runs(), IsEmpty());
 }
 
 /// Two evaluations of the same images are not two measurements.
-TEST(Spool, FindRunWithSameImagesReturnsJudgedRunWithSameImages) {
+TEST(Spool, SearchSameImagesReturnsJudgedRunWithSameImages) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
@@ -107,33 +108,33 @@ TEST(Spool, FindRunWithSameImagesReturnsJudgedRunWithSameImages) {
   for (const std::string state : {"here", "in the records"}) {
     spool.store_run(earlier);
     if (state != "here") spool.deliver_waiting();
-    EXPECT_EQ(spool.find_same_images(again), earlier.run) << state;
-    EXPECT_EQ(spool.find_same_images(earlier), "") << "itself, " << state;
+    EXPECT_EQ(spool.search_same_images(again).run, earlier.run) << state;
+    EXPECT_EQ(spool.search_same_images(earlier).run, std::nullopt) << "itself, " << state;
     RunRecord fewer = again, other = again, camera = again, none = again;
     fewer.images.resize(kImagesOfARun / 2);
-    EXPECT_EQ(spool.find_same_images(fewer), earlier.run) << state;
+    EXPECT_EQ(spool.search_same_images(fewer).run, earlier.run) << state;
     other.images.back().sha256 = "another";
-    EXPECT_EQ(spool.find_same_images(other), "") << "one is new, " << state;
+    EXPECT_EQ(spool.search_same_images(other).run, std::nullopt) << "one is new, " << state;
     other.images.back().rejection = "blurred";
-    EXPECT_EQ(spool.find_same_images(other), earlier.run) << "and not used, " << state;
+    EXPECT_EQ(spool.search_same_images(other).run, earlier.run) << "and not used, " << state;
     camera.camera = "another";
-    EXPECT_EQ(spool.find_same_images(camera), "") << state;
+    EXPECT_EQ(spool.search_same_images(camera).run, std::nullopt) << state;
     none.images.clear();
-    EXPECT_EQ(spool.find_same_images(none), "") << state;
+    EXPECT_EQ(spool.search_same_images(none).run, std::nullopt) << state;
   }
   // Images of a run that did not count can be used again.
   RunRecord voided_run = earlier;
   voided_run.events = {make_run_event_now(kVoided, "wrong lamps", "Ann")};
   spool.store_run(voided_run);
-  EXPECT_EQ(spool.find_same_images(again), "");
+  EXPECT_EQ(spool.search_same_images(again).run, std::nullopt);
   RunRecord invalid = numbered_run(3), invalid_again = numbered_run(3);
   invalid.set_causes({{"no captures.csv"}});
   invalid_again.run = numbered_run(4).run;
   spool.store_run(invalid);
-  EXPECT_EQ(spool.find_same_images(invalid_again), "");
+  EXPECT_EQ(spool.search_same_images(invalid_again).run, std::nullopt);
   spool.deliver_waiting();
-  EXPECT_EQ(spool.find_same_images(again), "");
-  EXPECT_EQ(spool.find_same_images(invalid_again), "");
+  EXPECT_EQ(spool.search_same_images(again).run, std::nullopt);
+  EXPECT_EQ(spool.search_same_images(invalid_again).run, std::nullopt);
 }
 
 /// A waiting run with later events is one run.

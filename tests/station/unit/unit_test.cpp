@@ -142,7 +142,7 @@ TEST(MakeVerdictScreen, NamesUnfinishedStepOrUnmeasuredGates) {
 }
 
 TEST_F(StationUnitTest, RejectsImageUsedByAnotherCamera) {
-  unit.set_image_lookup([](const std::string&) { return ImageUser{"0001", "R"}; });
+  unit.set_image_lookup([](const std::string&) { return std::optional(ImageUser{"0001", "R"}); });
   fs::copy_file(kView, folder / "0.png");
   unit.add_step_images(StationStep::boards, {folder / "0.png"});
   EXPECT_EQ(
