@@ -218,6 +218,22 @@ std::string explain_no_lamp(const std::vector<Observation>& images, const LampMa
   return message;
 }
 
+/// Describes a readout direction of options or calibration that the images contradict; otherwise
+/// empty.
+std::string explain_readout(const LampImages& images, const FrontendOptions& options) {
+  std::optional<Readout> given = options.readout;
+  std::optional<std::array<int, 2>> imager_px;
+  if (images.calibration) {
+    imager_px = images.calibration->camera.imager_px;
+    if (!given) given = images.calibration->camera.readout;
+  }
+  if (!given) return "";
+  const std::string source =
+      options.readout ? "--readout" : images.calibration_file.filename().string();
+  return describe_wrong_readout(list_lamp_images(images.images), *given, source, options,
+                                imager_px);
+}
+
 /// Creates the folder for annotated images.
 void create_folder(const fs::path& folder, const fs::path& images) {
   std::error_code error;
@@ -377,14 +393,17 @@ Observations detect_lamps(const LampImages& images, ImageUse use, const Frontend
                           const IntakeProgress& progress) {
   Observations result = LampIntake(images, use, options)
                             .detect_lamps_in_images(list_lamp_images(images.images), progress);
-  check_any_identified(images, result);
+  check_any_identified(images, options, result);
   return result;
 }
 
-void check_any_identified(const LampImages& images, Observations& result) {
+void check_any_identified(const LampImages& images, const FrontendOptions& options,
+                          Observations& result) {
   check_any_readable(images.images, result.images);
   if (count_lights(result.images, LightKind::lamp) == 0) {
-    result.failure = {false, explain_no_lamp(result.images, images.lamps)};
+    const std::string wrong_readout = explain_readout(images, options);
+    result.failure = {false, wrong_readout.empty() ? explain_no_lamp(result.images, images.lamps)
+                                                   : wrong_readout};
   } else if (std::none_of(result.images.begin(), result.images.end(),
                           [](const Observation& image) { return image.is_image_kept(); })) {
     result.failure = {false, explain_no_image(result.images)};
@@ -417,6 +436,19 @@ Readout estimate_readout(const std::vector<fs::path>& images, const std::optiona
   result.notes.push_back(fmt::format("the readout is not stated: the images show stripes along {}",
                                      *found == Readout::rows ? "rows" : "columns"));
   return *found;
+}
+
+std::string describe_wrong_readout(const std::vector<fs::path>& images, Readout given,
+                                   const std::string& source, const FrontendOptions& options,
+                                   const std::optional<std::array<int, 2>>& imager_px) {
+  Observations remarks;
+  const Readout shown = estimate_readout(images, {}, options, imager_px, remarks);
+  if (shown == given || !remarks.warnings.empty()) return "";
+  // [LAMP-12] `stripes along`
+  return fmt::format(
+      "the readout is along {} in {}, but the images show stripes along {}; correct it",
+      given == Readout::rows ? "rows" : "columns", source,
+      shown == Readout::rows ? "rows" : "columns");
 }
 
 void check_frequencies(const LampMap& lamps, const fs::path& lamps_file) {

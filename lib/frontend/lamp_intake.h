@@ -127,13 +127,22 @@ Observations detect_lamps(const LampImages& images, ImageUse use, const Frontend
 
 /// Sets Observations::failure if no lamp is identified in any image, or no image is kept.
 /// @throws InputError if no image can be read
-void check_any_identified(const LampImages& images, Observations& result);
+void check_any_identified(const LampImages& images, const FrontendOptions& options,
+                          Observations& result);
 
 /// Estimates the readout direction from images unless it is known. Adds a note to `result`, or a
 /// warning if the images do not determine it and rows are assumed.
 Readout estimate_readout(const std::vector<std::filesystem::path>& images,
                          const std::optional<Readout>& known, const FrontendOptions& options,
                          const std::optional<std::array<int, 2>>& imager_px, Observations& result);
+
+/// Describes a readout direction that the stripes in the images contradict, in one line; empty if
+/// they do not.
+/// @param given   readout direction with which the lamps were not identified
+/// @param source  file or option that gives it, for the message
+std::string describe_wrong_readout(const std::vector<std::filesystem::path>& images, Readout given,
+                                   const std::string& source, const FrontendOptions& options,
+                                   const std::optional<std::array<int, 2>>& imager_px);
 
 /// Checks the frequencies of a lamp map.
 /// @throws InputError if no lamp has a frequency

@@ -346,7 +346,7 @@ LocateResult locate_from_images(const LampImages& images, ImageUse use, LocateIn
         return repeat_if_tilted(input, positioner, image, std::move(lights), detect);
       });
   Observations seen = intake.detect_lamps_in_images(list_lamp_images(images.images), progress);
-  check_any_identified(images, seen);
+  check_any_identified(images, options, seen);
   input.frames = collect_lamp_frames(seen.images);
   LocateResult result;
   if (has_detections(input.frames)) {

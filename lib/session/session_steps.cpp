@@ -374,18 +374,12 @@ bool is_step_needed(const SessionState& state, const SessionStepPlan& step) {
 void add_readout_remark(const SessionState& state, StepResult& result) {
   if (state.result.steps.empty() || state.session.classifier_path()) return;
   const Camera& camera = state.result.calibration->camera;
-  Observations remarks;
-  const Readout shown = estimate_readout(list_images(state.session.rotation_folder()), {},
-                                         make_lamp_options(state), camera.imager_px, remarks);
-  if (!camera.readout || shown == *camera.readout || !remarks.warnings.empty()) return;
-  // [LAMP-12] `stripes along`
-  result.set_step_failure(
-      StepFailure::bad_input,
-      fmt::format("the readout is along {} in {}, but the images show stripes along {}; correct "
-                  "it",
-                  shown == Readout::rows ? "columns" : "rows",
-                  state.session.camera_calibration_path() ? "camera.yaml" : "--readout",
-                  shown == Readout::rows ? "rows" : "columns"));
+  if (!camera.readout) return;
+  const std::string error =
+      describe_wrong_readout(list_images(state.session.rotation_folder()), *camera.readout,
+                             state.session.camera_calibration_path() ? "camera.yaml" : "--readout",
+                             make_lamp_options(state), camera.imager_px);
+  if (!error.empty()) result.set_step_failure(StepFailure::bad_input, error);
 }
 
 }  // namespace vlp

@@ -122,7 +122,10 @@ const Program kPrograms[] = {
        "--lamps bad.yaml --calibration rig/true_calibration.yaml -o o",
        "bad.yaml: no lamp has a frequency_hz, which is needed to identify lamps"},
       {2, "echo no >bad.mp4; vlp-detect bad.mp4 $R -o o", "bad.mp4: cannot be opened as a video"},
-      {3, "vlp-detect rig/sample-boards $R -o o", "no lamp was identified wholly in view"}}},
+      {3, "vlp-detect rig/sample-boards $R -o o", "no lamp was identified wholly in view"},
+      {3, "vlp-detect rig/sample $R -o o --readout columns",
+       "the readout is along columns in --readout, but the images show stripes along rows; correct "
+       "it"}}},
     {"vlp-dispersion",
      {{2, "vlp-dispersion $E -o o", "images is required; see vlp-dispersion --help"},
       {2, "vlp-dispersion station.csv $E -o o", "the positions of the captures are unknown"},

@@ -86,6 +86,14 @@ TEST_F(LocateFromImages, EstimatesReadoutThatCalibrationLacks) {
   EXPECT_THAT(result.notes, Contains(HasSubstr("the images show stripes along rows")));
 }
 
+TEST_F(LocateFromImages, NamesReadoutOfCalibrationThatImagesContradict) {
+  LocateInput input = make_input();
+  input.calibration.camera.readout = Readout::columns;
+  const LocateResult result = locate("check", input);
+  EXPECT_FALSE(result.has_succeeded());
+  EXPECT_THAT(result.message, HasSubstr("but the images show stripes along rows; correct it"));
+}
+
 TEST_F(LocateFromImages, SkipsDamagedImage) {
   write_session_file("check/0003.png", "no image");
   const LocateResult result = locate("check", make_input());
