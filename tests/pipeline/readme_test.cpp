@@ -59,27 +59,52 @@ std::vector<std::string> lines_in(const fs::path& file) {
   return lines;
 }
 
-/// Returns the indented command lines that begin with one of our programs or a command of
-/// kCommands, joined where a backslash says so.
-std::vector<std::string> commands_in(const fs::path& page) {
+/// Command of a page, and its exit code.
+struct Command {
+  std::string line;
+  int exit_code = 0;
+};
+
+/// Returns the command lines that begin with one of our programs or a command of kCommands, joined
+/// where a backslash says so. Indented ones succeed; those in blocks ```bash miss a gate.
+std::vector<Command> commands_in(const fs::path& page) {
   constexpr const char* kCommands[] = {"build/bin/vlp-", "vlp-",  "cp ",
                                        "mkdir -p out/",  "grep ", "scripts/compare_"};
-  std::vector<std::string> commands;
-  bool continues = false;
+  std::vector<Command> commands;
+  bool continues = false, misses_gate = false;
   for (const std::string& line : lines_in(page)) {
+    if (line.starts_with("```")) misses_gate = line == "```bash";
+    const std::string indent = misses_gate ? "" : "    ";
     if (continues) {
-      commands.back() += line;
+      commands.back().line += line;
     } else if (std::ranges::any_of(kCommands, [&](const char* command) {
-                 return line.starts_with(std::string("    ") + command);
+                 return line.starts_with(indent + command);
                })) {
-      commands.push_back(line.substr(4));
+      commands.push_back({line.substr(indent.size()), misses_gate ? 1 : 0});
     } else {
       continue;
     }
     continues = line.ends_with('\\');
-    if (continues) commands.back().pop_back();
+    if (continues) commands.back().line.pop_back();
   }
   return commands;
+}
+
+/// Returns the lines in blocks ```text of a page up to "...", which programs print, as patterns in
+/// which the last digit of a fraction may be another one.
+std::vector<std::string> printed_patterns(const fs::path& page) {
+  std::vector<std::string> patterns;
+  bool inside = false;
+  for (const std::string& line : lines_in(page)) {
+    if (line.starts_with("```")) {
+      inside = line == "```text";
+    } else if (inside) {
+      const std::string text = line.substr(0, line.find(" ..."));
+      const std::string escaped = std::regex_replace(text, std::regex("[.()+]"), "\\$&");
+      patterns.push_back(std::regex_replace(escaped, std::regex("(\\.\\d*)\\d"), "$1\\d"));
+    }
+  }
+  return patterns;
 }
 
 /// Returns the cells of columns "repeat with" that are not empty.
@@ -189,51 +214,79 @@ void expect_formats_to_name_columns(const fs::path& results) {
   EXPECT_GT(tables, 10U);
 }
 
-TEST(DocumentationPages, CommandsOnPagesExitWithZero) {
+/// Folder like the source folder after a build, in which the commands of pages run.
+class PageCommands : public testing::Test {
+ protected:
+  PageCommands() {
+    fs::create_directories(folder / "build");
+    fs::create_directories(folder / "out/recordings");
+    fs::create_directory_symlink(VLP_PROGRAMS_DIR, folder / "build/bin");
+    for (const char* name : {"datasets", "scripts"}) {
+      fs::create_directory_symlink(kSource / name, folder / name);
+    }
+    // The recordings that scripts/fetch_recordings.sh fetches for the tutorial.
+    for (const char* name : {"aprilgrid-mocap", "chessboard-fisheye", "led-1khz-frame"}) {
+      const fs::path recording = real_data(name);
+      has_recordings = has_recordings && !recording.empty();
+      if (has_recordings) {
+        fs::create_directory_symlink(recording, folder / "out/recordings" / name);
+      }
+    }
+  }
+  /// Runs the commands that were not run before. Returns all that they print.
+  std::string run(const fs::path& page, const std::vector<Command>& commands) {
+    std::string printed;
+    for (const auto& [command, exit_code] : commands) {
+      if (!ran.insert(command).second) continue;
+      const auto result =
+          run_program("cd '" + (folder / "").string() + "' && REAL=out/recordings; " + command);
+      EXPECT_EQ(result.exit_code, exit_code) << name_of_page(page) << ": " << command << "\n"
+                                             << result.errors;
+      programs.insert(command.substr(0, command.find(' ')));
+      printed += result.output + result.errors;
+    }
+    return printed;
+  }
+
+  const TemporaryFolder folder;
+  bool has_recordings = true;
+  std::set<std::string> ran, programs;
+};
+
+TEST_F(PageCommands, ExitWithZero) {
 #ifdef __SANITIZE_ADDRESS__
   GTEST_SKIP() << "hundreds of images; the programs' own tests run under the sanitizers";
 #endif
-  const TemporaryFolder folder;
-  fs::create_directories(folder / "build");
-  fs::create_directories(folder / "out");
-  fs::create_directory_symlink(VLP_PROGRAMS_DIR, folder / "build/bin");
-  for (const char* name : {"datasets", "scripts"}) {
-    fs::create_directory_symlink(kSource / name, folder / name);
-  }
-  // The recordings that scripts/fetch_recordings.sh fetches for the tutorial.
-  bool has_recordings = true;
-  fs::create_directories(folder / "out/recordings");
-  for (const char* name : {"aprilgrid-mocap", "chessboard-fisheye", "led-1khz-frame"}) {
-    const fs::path recording = real_data(name);
-    has_recordings = has_recordings && !recording.empty();
-    if (has_recordings) {
-      fs::create_directory_symlink(recording, folder / "out/recordings" / name);
-    }
-  }
-  std::set<std::string> ran, programs;
   for (const fs::path& page : pages_in_reading_order()) {
-    if (name_of_page(page) == "apps/TUTORIAL.md" && !has_recordings) continue;
-    std::vector<std::string> commands = commands_in(page);
+    if (name_of_page(page) == "apps/TUTORIAL.md") continue;
+    std::vector<Command> commands = commands_in(page);
     for (const std::string& cell : repeat_with_cells(page)) {
       // Longer ones render images first.
       if (!has_recordings || !cell.starts_with("`build/bin/") || cell.find("&&") < cell.size())
         continue;
-      commands.push_back(cell.substr(1, cell.find('`', 1) - 1));
+      commands.push_back({cell.substr(1, cell.find('`', 1) - 1)});
     }
-    for (const std::string& command : commands) {
-      if (!ran.insert(command).second) continue;
-      const auto result = run_program("cd '" + (folder / "").string() +
-                                      "' && VLP_REAL_DATA_DIR=out/recordings; " + command);
-      EXPECT_EQ(result.exit_code, 0) << name_of_page(page) << ": " << command << "\n"
-                                     << result.errors;
-      programs.insert(command.substr(0, command.find(' ')));
-    }
+    run(page, commands);
   }
   for (const auto& program : fs::directory_iterator(VLP_PROGRAMS_DIR)) {
     const std::string name = program.path().filename().string();
     EXPECT_TRUE(programs.contains("build/bin/" + name)) << name << " is shown by no page";
   }
   expect_formats_to_name_columns(folder / "out");
+}
+
+TEST_F(PageCommands, PrintValuesStatedInTutorial) {
+  if (!has_recordings) GTEST_SKIP() << "no real captures: set VLP_REAL_DATA_DIR";
+  const fs::path page = kSource / "apps/TUTORIAL.md";
+  const auto collapse = [](const std::string& text) {
+    return std::regex_replace(text, std::regex("\\s+"), " ");
+  };
+  const std::string printed = collapse(run(page, commands_in(page)));
+  const std::vector<std::string> patterns = printed_patterns(page);
+  EXPECT_GT(patterns.size(), 30U);
+  for (const std::string& pattern : patterns) {
+    EXPECT_TRUE(std::regex_search(printed, std::regex(collapse(pattern)))) << pattern;
+  }
 }
 
 /// Names of the programs, such as "vlp-locate".
