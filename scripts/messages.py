@@ -48,7 +48,7 @@ FIRST_ERRORS = [
     ("but the stripes of", "wrong row time or frequencies", "take the measured row time if the frequencies are certain"),
     ("no lamp was identified wholly in view", "exposure too long; lamps steady, cut or too small",
      "look at `--annotate`"),
-    ("the images show", "`board.yaml` describes another board", "copy the values that the message states"),
+    ("the images show cols", "`board.yaml` describes another board", "copy the values that the message states"),
     ("expected_max_error_px", "exit code 1: few tilts or positions of the board",
      "the view that `next view` names, or `--lens auto` ([example](TUTORIAL.md#2-estimate-the-lens))"),
     ("the lamps contradict each other", "map of another room, confused lamps, or a tilted camera taken as level",

@@ -444,7 +444,7 @@ std::string describe_wrong_readout(const std::vector<fs::path>& images, Readout 
   Observations remarks;
   const Readout shown = estimate_readout(images, {}, options, imager_px, remarks);
   if (shown == given || !remarks.warnings.empty()) return "";
-  // [LAMP-12] `stripes along`
+  // [LAMP-15] `stripes along` | wrong readout in an option or file | correct the one that is named
   return fmt::format(
       "the readout is along {} in {}, but the images show stripes along {}; correct it",
       given == Readout::rows ? "rows" : "columns", source,

@@ -10,8 +10,8 @@
 namespace vlp {
 
 /// Eigendecomposition A = V diag(values) V^T of a symmetric matrix A. Eigenvalues are ascending;
-/// column i of `vectors` (V) is the eigenvector of values[i], of unit length. All are NaN if the
-/// iteration does not converge.
+/// column i of `vectors` (V) is the eigenvector of values[i], of unit length. 2 x 2: in closed
+/// form; otherwise all are NaN if the iteration does not converge.
 template <int N>
 struct SymmetricEigen {
   Eigen::Matrix<double, N, 1> values;

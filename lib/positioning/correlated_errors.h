@@ -75,7 +75,7 @@ class CommonErrors {
   RayJacobian differentiate_ray(const Eigen::Vector3d& ray_in_base, const Lens& lens) const;
 
   /// Matrix of derivatives G: of the first `States` states of a fix, or of the residuals of an
-  /// observation. They are with respect to the shared errors and to the errors of each lamp.
+  /// observation. Columns: shared errors, then errors of each lamp.
   template <int States>
   struct GainMatrix {
     using SharedGain = Eigen::Matrix<double, States, Eigen::Dynamic, Eigen::ColMajor, States, 20>;

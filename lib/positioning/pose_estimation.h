@@ -105,7 +105,7 @@ class EvaluatedState {
   Eigen::Vector3d pitch_axis;
 };
 
-/// Position q of a lamp relative to the camera along the axes of the body, m. With its derivatives
+/// Position q of a lamp relative to the camera along the axes of the body, m, with its derivatives
 /// with respect to all states, and its velocity dq/dt.
 struct LinearizedLampPosition {
   Eigen::Vector3d q, velocity_m_per_s;

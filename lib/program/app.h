@@ -36,8 +36,8 @@ class GateNotMet : public std::runtime_error {
 /// Returns the default number of threads: the number of cores, at least 1.
 int count_cpu_cores();
 
-/// Returns the parser of a program's arguments. What CLI11 defines for it is compiled here, not in
-/// each program.
+/// Returns the parser of a program's arguments. Compiles the constructor of CLI::App once instead
+/// of in each program.
 std::unique_ptr<CLI::App> make_app(const std::string& description, const std::string& name);
 
 /// Return validators of options that accept finite numbers: any, positive, or not negative.

@@ -17,7 +17,7 @@ namespace vlp {
 /// Smaller horizontal errors at known points are no fault of the captures: a camera may have them.
 inline constexpr double kMinOutlierError_m = 0.005;
 
-/// Capture of a folder: its image, and its index among all captures of the folder.
+/// Capture of a folder: its image, and its index among the captures used.
 struct CaptureName {
   std::string image;
   std::size_t index = 0;
@@ -69,8 +69,8 @@ std::optional<CommonOffset> find_common_offset(const EvaluationInput& input);
 /// Describes an offset with its size and direction, and its possible reasons, in one line.
 std::string describe_common_offset(const CommonOffset& offset);
 
-/// Adds the RMS residual of a fix from three lamps or more, as input of
-/// describe_residual_outliers().
+/// Adds the RMS residual of a fix, as input of describe_residual_outliers(), if the fix is from
+/// three lamps or more.
 void add_residual(const Fix& fix, const std::string& image, std::size_t capture,
                   std::vector<CaptureResidual>& residuals);
 

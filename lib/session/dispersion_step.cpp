@@ -187,8 +187,8 @@ std::optional<JointCovariance> compute_joint_covariance(DispersionResult& result
 }
 
 /// Finds captures that do not fit the result, by the residuals of their fixes.
-void find_inconsistent_captures(DispersionResult& result, const KnownPositions& places,
-                                const LampMap& lamps) {
+void set_inconsistent_captures(DispersionResult& result, const KnownPositions& places,
+                               const LampMap& lamps) {
   const Positioner positioner(lamps, result.calibration);
   std::vector<CaptureResidual> residuals;
   for (std::size_t i = 0; i < places.captures.size(); ++i) {
@@ -281,7 +281,7 @@ DispersionResult run_dispersion_step(const LampCaptures& input, const KnownPosit
   auto covariance = compute_joint_covariance(result, captures_for, input, leveled);
   result.calibration =
       add_dispersion(input.calibration, fit.dispersion, std::move(covariance), std::move(entry));
-  find_inconsistent_captures(result, places, input.lamps);
+  set_inconsistent_captures(result, places, input.lamps);
   result.drawing = [fit] {
     return draw_dispersion(make_dispersion_plot("Fixes at a reference point", fit));
   };

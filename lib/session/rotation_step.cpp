@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <utility>
 
@@ -46,9 +45,13 @@ JointCovariance append_center(JointCovariance lens, const MatrixX& jacobian_wrt_
 JointCovariance make_joint_covariance(const Calibration& calibration, const MatrixX& own,
                                       const std::optional<MatrixX>& joint) {
   JointCovariance lens = make_lens_covariance(calibration);
+  const MatrixX lens_covariance = lens.matrix;
   const MatrixX independent = MatrixX::Zero(own.rows(), lens.matrix.cols());
   JointCovariance result = append_center(std::move(lens), independent, own);
-  if (joint) result.matrix = *joint;
+  if (joint) {
+    result.matrix = *joint;
+    result.matrix.topLeftCorner(lens_covariance.rows(), lens_covariance.cols()) = lens_covariance;
+  }
   return result;
 }
 
@@ -164,7 +167,7 @@ MapErrors detect_errors_in_map(const LampCaptures& input, const Calibration& cal
 }
 
 /// Finds captures that do not fit the result, by the residuals of their fixes.
-void find_inconsistent_captures(RotationResult& result, const LampCaptures& input) {
+void set_inconsistent_captures(RotationResult& result, const LampCaptures& input) {
   const Positioner positioner(input.lamps, result.calibration);
   std::vector<CaptureResidual> residuals;
   for (std::size_t i = 0; i < input.frames.size(); ++i) {
@@ -260,7 +263,7 @@ RotationResult run_rotation_step(const LampCaptures& input, RotationMethod metho
   add_warnings(result);
   result.calibration = add_rotation_center(input.calibration, result.fit.center,
                                            std::move(covariance), std::move(entry));
-  find_inconsistent_captures(result, input);
+  set_inconsistent_captures(result, input);
   const std::string title = fmt::format("{}, method {}", camera.id, rotation_method_name(method));
   result.drawing = [title, rotation = result.rotation, circles = result.circles, fit = result.fit,
                     camera] {

@@ -90,6 +90,7 @@ class SessionRun {
     for (const std::string& name : state_.options.steps_to_redo) {
       if (std::ranges::find(steps, name, &SessionStepPlan::name) != steps.end()) continue;
       std::vector<std::string> names;
+      names.reserve(steps.size());
       for (const SessionStepPlan& step : steps) names.push_back(step.name);
       throw std::invalid_argument(
           fmt::format("no step {}; the steps are: {}", name, fmt::join(names, ", ")));

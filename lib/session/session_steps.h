@@ -24,7 +24,8 @@ struct SessionState {
   const SessionOptions& options;
   const SessionObserver& observer;
   std::vector<Gate> gates;
-  /// Calibration by the last step; camera.yaml of the session before the first one, or empty.
+  /// Path of the calibration by the last step; before the first step that of the session's
+  /// camera.yaml, or empty.
   std::filesystem::path calibration_file;
   /// Steps and gates so far, and the calibration by the last step.
   SessionResult result = {};

@@ -141,7 +141,7 @@ class AdjustmentProblem {
   bool has_lever_arm = false;
   /// True if the zenith keeps its initial value.
   bool is_zenith_exact = false;
-  /// True if the lens keeps its initial value, the errors of which change the other unknowns.
+  /// True if the lens keeps its initial value. Its errors propagate to the other unknowns.
   bool is_lens_held = false;
   /// Factor by which all sigma_px are multiplied.
   double noise_scale = 1;

@@ -132,6 +132,7 @@ void estimate_offset(DispersionFit& fit, const LampMap& map, const Calibration& 
       std::count_if(fixes.begin(), fixes.end(), [](const auto& fix) { return fix.has_value(); });
   fit.captures_without_fix = static_cast<int>(std::ssize(fixes) - count);
   fit.fixes.clear();
+  fit.status = DispersionStatus::no_fix;
   if (count == 0) return;
   const bool paper = method == DispersionMethod::chen_guan;
   const std::vector<bool> all(fixes.size(), true);

@@ -93,7 +93,7 @@ bool scale_contradicted_noise(std::vector<ReferencePointCapture>& captures, cons
   for (ReferencePointCapture& capture : captures) {
     const Fix fix = locate_camera_of_capture(positioner, capture),
               stated = locate_camera_of_capture(unchecked, capture);
-    if (!fix.has_succeeded() || !stated.has_succeeded()) continue;
+    if (!fix.has_succeeded() || !stated.has_succeeded() || fix.lamps != stated.lamps) continue;
     const double factor = std::sqrt(fix.noise_covariance.trace() / stated.noise_covariance.trace());
     constexpr double rounding = 1e-6;
     if (!(factor > 1 + rounding)) continue;

@@ -58,7 +58,7 @@ FixStatus remove_outlier_lamps(std::vector<ReferencePointCapture>& captures, con
                                const Calibration& calibration);
 
 /// Increases sigma_px of the captures whose residuals contradict it with this offset
-/// (Fix::noise_covariance). Returns true if there are any.
+/// (Fix::noise_covariance), unless a lamp is an outlier. Returns true if there are any.
 bool scale_contradicted_noise(std::vector<ReferencePointCapture>& captures, const LampMap& map,
                               Calibration calibration, const Eigen::Vector2d& offset_px);
 

@@ -222,9 +222,15 @@ std::string explain_why_lens_not_found(const InitialSolutions& initial, LensMode
   return problem.empty() ? std::string(describe_status(status)) : problem;
 }
 
-/// Returns the fits of the other models that may describe the lens. Sets are_models_compared. With
-/// `may_be_fisheye`, recommends OPENCV_FISHEYE.
-std::vector<IntrinsicsSolution> fit_other_models(bool may_be_fisheye, LensEstimate& result) {
+/// Fits of other models to the corners of a solution.
+struct OtherFits {
+  /// Those that may describe the lens.
+  std::vector<IntrinsicsSolution> possible;
+  std::optional<IntrinsicsSolution> fisheye;
+};
+
+/// Fits other models. Sets are_models_compared.
+OtherFits fit_other_models(LensEstimate& result) {
   const IntrinsicsSolution& solution = result.solution;
   if (is_splined_lens_model(solution.problem.lens_model)) return {};
   const auto comparison = compare_lens_models(solution);
@@ -232,8 +238,7 @@ std::vector<IntrinsicsSolution> fit_other_models(bool may_be_fisheye, LensEstima
   if (!comparison) return {};
   const auto fisheye =
       std::ranges::find(comparison->candidates, LensModel::fisheye, &LensCandidate::model);
-  if (may_be_fisheye && fisheye->fit) recommend_fisheye(*fisheye->fit, result);
-  return list_plausible_model_fits(solution, *comparison);
+  return {list_plausible_model_fits(solution, *comparison), fisheye->fit};
 }
 
 /// Returns the region in which the lens is calibrated and each of the other models has rays.
@@ -280,13 +285,12 @@ std::optional<AspectErrorEffect> add_print_uncertainty(double print_sd, LensEsti
   return print;
 }
 
-/// Adds the uncertainty of a solution. `print_sd` is Board::print_sd; see fit_other_models().
-void add_uncertainty(const SplitViews& views, double print_sd, bool may_be_fisheye,
-                     LensEstimate& result) {
+/// Adds the uncertainty of a solution. `print_sd` is Board::print_sd.
+void add_uncertainty(const SplitViews& views, double print_sd,
+                     const std::vector<IntrinsicsSolution>& others, LensEstimate& result) {
   const IntrinsicsSolution& solution = result.solution;
   const auto uncertainties =
       ProjectionUncertainty::compare_corners_and_tags(solution, views.solved.lattice);
-  const std::vector<IntrinsicsSolution> others = fit_other_models(may_be_fisheye, result);
   result.report =
       make_lens_report(solution, views.solved, uncertainties, compute_region(solution, others));
   result.coverage = measure_view_coverage(solution, views.solved);
@@ -373,7 +377,12 @@ LensEstimate estimate_lens(LensViews input) {
   }
   warn_about_views(result);
   warn_about_edges(result.solution, result);
-  add_uncertainty(views, input.board.print_sd, may_be_fisheye, result);
+  OtherFits others = fit_other_models(result);
+  if (may_be_fisheye && !others.fisheye) {
+    if (auto fisheye = fit_fisheye_lens(initial)) others.fisheye = std::move(fisheye->solution);
+  }
+  if (may_be_fisheye && others.fisheye) recommend_fisheye(*others.fisheye, result);
+  add_uncertainty(views, input.board.print_sd, others.possible, result);
   return result;
 }
 

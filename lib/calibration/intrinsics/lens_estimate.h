@@ -59,8 +59,8 @@ struct LensEstimate {
   /// Uncertainty from the choice of the lens model; std::nullopt if noise explains all differences
   /// between the models.
   std::optional<ModelUncertainty> model_uncertainty = {};
-  /// Model that fits the corners of the solution clearly better than the requested one, or equally
-  /// well if the board is seen near a right angle off the axis. None if no models are compared.
+  /// Model that fits clearly better than the requested one, or equally well if the board is seen
+  /// near a right angle off the axis.
   std::optional<LensModel> better_model = {};
   /// Change of projections by one standard deviation of the board's print
   /// (estimate_aspect_effect()), RMS over the image, px; std::nullopt if

@@ -45,7 +45,7 @@ void warn_if_offline(KnownRuns& known) {
   spdlog::warn("{}", escape_for_terminal(known.runs.make_operator_notice()));
 }
 
-RunFilter remove_conditions_any(RunFilter filter) {
+RunFilter remove_any_conditions(RunFilter filter) {
   constexpr const char* any = "any";
   for (std::string* text : {&filter.station, &filter.verdict, &filter.kind}) {
     if (*text == any) text->clear();
@@ -58,7 +58,7 @@ RunFilter filter_by_options(const StationRecordsOptions& options, const KnownRun
   if (filter.station.empty() && known.station_config() != nullptr) {
     filter.station = known.station_config()->station;
   }
-  return remove_conditions_any(std::move(filter));
+  return remove_any_conditions(std::move(filter));
 }
 
 void check_output_option(const StationRecordsOptions& options, const KnownRuns& known) {

@@ -24,16 +24,16 @@ struct KnownRuns {
   const StationConfig* station_config() const { return station ? &*station : nullptr; }
 };
 
-/// Opens the runs of a station, of which it first delivers those that wait, or of records alone.
-/// Reports the state of the spool. If the records are unavailable, commands that continue with
+/// Opens the runs of a station or of records alone. Delivers waiting runs first, and reports the
+/// state of the spool. If the records are unavailable, commands that continue with
 /// waiting runs report it (warn_if_offline()).
 KnownRuns open_runs(const StationRecordsOptions& options);
 
 /// Reports that a command used the waiting runs because the records are unavailable.
 void warn_if_offline(KnownRuns& known);
 
-/// Returns the filter with "any" replaced by no condition.
-RunFilter remove_conditions_any(RunFilter filter);
+/// Removes the conditions that are "any".
+RunFilter remove_any_conditions(RunFilter filter);
 
 /// Returns the filter of the options: runs of --station, unless --of-station is given.
 RunFilter filter_by_options(const StationRecordsOptions& options, const KnownRuns& known);

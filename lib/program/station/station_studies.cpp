@@ -197,7 +197,7 @@ void print_gauge_study(const StationRecordsOptions& options) {
   Records& records = known.runs.records_or_throw();
   RunFilter filter = options.filter;
   if (filter.kind.empty()) filter.kind = "unit";
-  const auto points = load_metric_values(records, options.metric, remove_conditions_any(filter));
+  const auto points = load_metric_values(records, options.metric, remove_any_conditions(filter));
   const auto values = select_study_values(points, options.units);
   const MeasurementStudy study = run_study([&] {
     check_no_shared_images(records, points, values);

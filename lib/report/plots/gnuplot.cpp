@@ -39,6 +39,8 @@ std::string run_gnuplot(std::string script, const fs::path& file) {
                                  .max_output_bytes = max_output_bytes});
   if (!child.start_error.empty())
     throw InputError(file, "cannot be drawn: gnuplot cannot be started: " + child.start_error);
+  if (!child.status && child.status_error.empty())
+    throw InputError(file, "cannot be drawn: gnuplot did not end within 120 s");
   if (!child.has_succeeded() || child.output.empty()) fail_without_image(file);
   return std::move(child.output);
 }

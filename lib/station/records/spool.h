@@ -95,7 +95,7 @@ class Spool {
   struct SameImages {
     /// Id of the first such run; std::nullopt if none was found.
     std::optional<std::string> run = {};
-    /// False if the records did not answer, so that only the waiting runs were searched.
+    /// False if the records, or a run in them, could not be read.
     bool is_complete = true;
   };
   /// Searches the waiting runs and the records for a judged run of the same unit, not voided, that
