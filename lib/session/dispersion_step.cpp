@@ -186,7 +186,7 @@ std::optional<JointCovariance> compute_joint_covariance(DispersionResult& result
   return leveled.covariance;
 }
 
-/// Finds captures that do not fit the result, by the residuals of their fixes.
+/// Describes the captures that do not fit the result, by the residuals of their fixes.
 void set_inconsistent_captures(DispersionResult& result, const KnownPositions& places,
                                const LampMap& lamps) {
   const Positioner positioner(lamps, result.calibration);

@@ -166,7 +166,7 @@ MapErrors detect_errors_in_map(const LampCaptures& input, const Calibration& cal
   return found;
 }
 
-/// Finds captures that do not fit the result, by the residuals of their fixes.
+/// Describes the captures that do not fit the result, by the residuals of their fixes.
 void set_inconsistent_captures(RotationResult& result, const LampCaptures& input) {
   const Positioner positioner(input.lamps, result.calibration);
   std::vector<CaptureResidual> residuals;

@@ -31,7 +31,7 @@ std::string make_script(const std::string& terminal, const Drawing& drawing) {
 /// ~/.gnuplot, which may run commands and change the plot. The script is named as a file, because
 /// gnuplot reads stdin itself byte by byte. Warnings of gnuplot are discarded.
 std::string run_gnuplot(std::string script, const fs::path& file) {
-  constexpr double time_limit_s = 120;
+  constexpr int time_limit_s = 120;
   constexpr std::size_t max_output_bytes = std::size_t{1} << 30;
   ChildResult child = run_child({.words = {"env", "LC_ALL=C.UTF-8", "gnuplot", "-d", "/dev/stdin"},
                                  .input = std::move(script),
@@ -40,7 +40,8 @@ std::string run_gnuplot(std::string script, const fs::path& file) {
   if (!child.start_error.empty())
     throw InputError(file, "cannot be drawn: gnuplot cannot be started: " + child.start_error);
   if (!child.status && child.status_error.empty())
-    throw InputError(file, "cannot be drawn: gnuplot did not end within 120 s");
+    throw InputError(
+        file, "cannot be drawn: gnuplot did not end within " + std::to_string(time_limit_s) + " s");
   if (!child.has_succeeded() || child.output.empty()) fail_without_image(file);
   return std::move(child.output);
 }
