@@ -16,6 +16,24 @@ using enum MetricSource;
 using enum Direction;
 
 constexpr auto kMetricKinds = std::to_array<MetricKind>({
+    {"board_white", "", station,
+     "level that 1 % of the pixels of a board image exceed, as a fraction of full scale, median",
+     "the boards are dark: exposure or gain of the camera, or light on the board", at_least, 1,
+     false},
+    {"lamp_white", "", station,
+     "level that 0.1 % of the pixels of a lamp image exceed, as a fraction of full scale, median",
+     "the lamps are dark: exposure or gain of the camera, or current of the lamps", at_least, 1,
+     false},
+    {"dark_level", "", station,
+     "median level of the lamp images, as a fraction of full scale: black level and ambient light",
+     "the dark is not black: black level of the camera, or ambient light", at_most, 1, false},
+    {"defective_pixels", "", station,
+     "number of pixels that are bright in all lamp images, or dark in all board images",
+     "the sensor has defective pixels"},
+    {"lamp_blur_px", "px", station,
+     "blur of the lamp edges: sigma, median over the lamps of the rotation",
+     "the lamps are blurred: vibration or motion during the exposure, or a lens out of focus",
+     at_most, kMaxLimit, false},
     {"blur_px", "px", station, "blur of the board edges: sigma, median over the views",
      "the lens is blurred: out of focus, or dirty"},
     {"focal_percent", "%", station, "difference between focal length and nominal focal length",
@@ -42,7 +60,7 @@ constexpr auto kMetricKinds = std::to_array<MetricKind>({
     {"local_shadow", "", lens,
      "largest relative loss of light in a part of the image, compared with the parts around it; "
      "needs AprilTags without corner squares",
-     "dust is on the lens or the sensor", at_most, 1},
+     "dust or shade on the lens or the sensor", at_most, 1},
     {"mtf50_worst_ratio", "", lens,
      "smallest MTF50 of a part of the image, divided by the mean; needs AprilTags without corner "
      "squares",

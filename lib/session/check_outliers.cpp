@@ -88,14 +88,64 @@ std::vector<PositionError> list_position_errors(const EvaluationInput& input) {
   return errors;
 }
 
+/// Positions of the ground truth in another order or frame.
+struct OtherTruth {
+  const char* description;
+  std::vector<Eigen::Vector2d> positions_m;
+};
+
+/// Returns the positions in reverse order, displaced by one row, and with exchanged coordinates.
+std::vector<OtherTruth> list_other_truths(const std::vector<Eigen::Vector2d>& positions_m) {
+  std::vector<OtherTruth> others{{"in reverse order", {positions_m.rbegin(), positions_m.rend()}},
+                                 {"one row too early", positions_m},
+                                 {"one row too late", positions_m},
+                                 {"with x and y exchanged", positions_m}};
+  auto &early_m = others[1].positions_m, &late_m = others[2].positions_m;
+  std::rotate(early_m.begin(), early_m.end() - 1, early_m.end());
+  std::rotate(late_m.begin(), late_m.begin() + 1, late_m.end());
+  for (Eigen::Vector2d& position_m : others[3].positions_m) position_m.reverseInPlace();
+  return others;
+}
+
+/// Describes ground truth that is in another order or frame than the captures: the median distance
+/// from the fixes is then less than a tenth. Returns an empty string if there is no such order.
+std::string describe_wrong_order(const EvaluationInput& input) {
+  std::vector<Eigen::Vector2d> fixes_m, truth_m;
+  if (input.fixes.rows.empty() || !input.truth) return "";
+  for (const FixError& error : compute_fix_errors(input, input.fixes).errors) {
+    fixes_m.emplace_back(input.fixes.rows[error.fix].fix->pose.position_m.head<2>());
+    truth_m.push_back(fixes_m.back() - error.horizontal_m);
+  }
+  if (fixes_m.size() < kMinErrors) return "";
+  const auto median_distance_m = [&](const std::vector<Eigen::Vector2d>& positions_m) {
+    std::vector<double> distances_m;
+    for (std::size_t i = 0; i < fixes_m.size(); ++i)
+      distances_m.push_back((fixes_m[i] - positions_m[i]).norm());
+    return upper_median(distances_m);
+  };
+  constexpr double max_ratio = 0.1;
+  const double limit_m = max_ratio * median_distance_m(truth_m);
+  if (limit_m < max_ratio * kMinOutlierError_m) return "";
+  for (const OtherTruth& other : list_other_truths(truth_m)) {
+    if (median_distance_m(other.positions_m) >= limit_m) continue;
+    // [STATION-21] `if they are taken` | rows or columns of the table exchanged | correct it
+    return fmt::format(
+        "the known positions agree with the fixes if they are taken {}: correct the "
+        "table",
+        other.description);
+  }
+  return "";
+}
+
 }  // namespace
 
-std::string describe_wrong_positions(const EvaluationInput& input) {
+std::string describe_wrong_positions(const EvaluationInput& input, double min_error_m) {
+  if (std::string order = describe_wrong_order(input); !order.empty()) return order;
   std::vector<CaptureError> errors;
   for (const PositionError& error : list_position_errors(input)) {
     errors.push_back({{input.fixes.rows[error.fix].image, error.fix}, error.horizontal_m.norm()});
   }
-  return describe_error_outliers(errors);
+  return describe_error_outliers(errors, min_error_m);
 }
 
 std::optional<CommonOffset> find_common_offset(const EvaluationInput& input) {
@@ -147,8 +197,8 @@ std::string describe_common_offset(const CommonOffset& offset) {
           : "the known points or the lamps have moved");
 }
 
-std::string describe_error_outliers(const std::vector<CaptureError>& errors) {
-  const Outliers outliers = collect_outliers(errors, &CaptureError::error_m, kMinOutlierError_m);
+std::string describe_error_outliers(const std::vector<CaptureError>& errors, double min_error_m) {
+  const Outliers outliers = collect_outliers(errors, &CaptureError::error_m, min_error_m);
   if (outliers.captures.empty()) return "";
   const double max_mm = kMmPerM * outliers.max, others_mm = kMmPerM * upper_median(outliers.others);
   if (outliers.captures.size() == 1) {

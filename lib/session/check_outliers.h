@@ -36,15 +36,19 @@ struct CaptureResidual {
 };
 
 /// Describes captures that were taken elsewhere than their table says, or by another camera, in one
-/// line: their errors are gross outliers of the others, more than 5 mm and 8 times the median.
+/// line: their errors are gross outliers of the others, more than `min_error_m` and 8 times the
+/// median.
 /// Returns an empty string if there are none, and for fewer than five errors. Outliers are fewer
 /// than half, because the median is typical of the others.
-std::string describe_error_outliers(const std::vector<CaptureError>& errors);
+std::string describe_error_outliers(const std::vector<CaptureError>& errors,
+                                    double min_error_m = kMinOutlierError_m);
 
-/// Describes captures that were not taken at their true positions (describe_error_outliers()), from
+/// Describes a table of true positions in another order, or with x and y exchanged, or captures
+/// that were not taken at their true positions (describe_error_outliers()). The latter are from
 /// fixes of three lamps or more: others may have large errors at the edge of a room. Returns an
 /// empty string if there are none.
-std::string describe_wrong_positions(const EvaluationInput& input);
+std::string describe_wrong_positions(const EvaluationInput& input,
+                                     double min_error_m = kMinOutlierError_m);
 
 /// Common offset of all captures at known points.
 struct CommonOffset {

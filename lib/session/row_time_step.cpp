@@ -156,10 +156,12 @@ RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMa
           compute_error_fraction(measured, given.row_time_s)};
 }
 
-std::string describe_other_row_time(const std::vector<Observation>& images, const LampMap& lamps,
-                                    const std::optional<Lens>& lens, const GivenRowTime& given) {
+RowTimeCheck search_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                             const std::optional<Lens>& lens, const GivenRowTime& given) {
   const auto found = estimate_row_time(std::array{std::span(images)}, {{}}, lamps, lens).row_time;
-  return found ? describe_wrong_row_time(*found, given) : "";
+  if (!found) return {};
+  return {*found, describe_wrong_row_time(*found, given),
+          compute_error_fraction(*found, given.row_time_s)};
 }
 
 void add_row_time_remark(const std::vector<Observation>& images, const LampMap& lamps,
@@ -169,7 +171,7 @@ void add_row_time_remark(const std::vector<Observation>& images, const LampMap& 
   const GivenRowTime given{*camera.row_time_s, source};
   std::string error;
   if (result.has_succeeded()) error = check_row_time(images, lamps, given).error;
-  if (error.empty()) error = describe_other_row_time(images, lamps, camera.lens, given);
+  if (error.empty()) error = search_row_time(images, lamps, camera.lens, given).error;
   if (error.empty()) return;
   if (result.has_succeeded()) {
     result.warnings.push_back(std::move(error));

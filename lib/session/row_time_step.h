@@ -103,20 +103,18 @@ std::string describe_wrong_row_time(const RowTime& measured, const GivenRowTime&
 RowTimeCheck check_row_time(const std::vector<Observation>& images, const LampMap& lamps,
                             const GivenRowTime& given);
 
-/// Finds another row time that makes the lights of the images lamps of the map, by their periods
-/// and positions, independently of their identification (select_row_time()): a wrong row
-/// time leaves lights unknown or exchanges lamps.
-///
-/// @return  the contradiction in one line; empty unless at least three lamps contradict the given
-///          row time as in check_row_time()
-std::string describe_other_row_time(const std::vector<Observation>& images, const LampMap& lamps,
-                                    const std::optional<Lens>& lens, const GivenRowTime& given);
+/// Compares the given row time with the one that makes the lights of the images lamps of the map,
+/// by their periods and positions, independently of their identification (select_row_time()): a
+/// wrong row time leaves lights unknown or exchanges lamps. The result is as that of
+/// check_row_time().
+RowTimeCheck search_row_time(const std::vector<Observation>& images, const LampMap& lamps,
+                             const std::optional<Lens>& lens, const GivenRowTime& given);
 
 /// Adds a contradiction of the row time of `camera` to the result of a step: in place of the reason
 /// if the step failed, as a warning otherwise, because fixes at rest are valid. The contradiction
 /// is that of check_row_time() if there is a result. Otherwise, and if identified
 /// lamps agree because each was taken for its neighbor, it is that of
-/// describe_other_row_time(). An unknown row time adds nothing.
+/// search_row_time(). An unknown row time adds nothing.
 ///
 /// @param source  name of the file or of the option that gives the row time
 void add_row_time_remark(const std::vector<Observation>& images, const LampMap& lamps,

@@ -9,19 +9,23 @@
 #   tests/benchmarks/station_trials.sh kinds [COUNT [FIRST_SEED]]    1 of each of 30 kinds
 #   tests/benchmarks/station_trials.sh mixed [COUNT [FIRST_SEED]]    10 units, each step with images of another
 #   tests/benchmarks/station_trials.sh loose [COUNT [FIRST_SEED]]    5 units that move before the check
+#   tests/benchmarks/station_trials.sh fixture|camera|images [COUNT [FIRST_SEED]]  faults of lamps and known
+#                                    points; of camera and sensor; of settings and images: 11, 16 and 21
+#                                    units of three sizes each; 1 seed
 #   tests/benchmarks/station_trials.sh sharpness [COUNT [FIRST_SEED]]  of each seed a good unit and 15
 #                                    with a veil, smear, dust, defocus or tilt, boards only; 1 seed
 #   tests/benchmarks/station_trials.sh timing [COUNT [FIRST_SEED]]   1 unit
 # A line for each, and the capability of good ones; exit code 1 when one did not end as it should. A good
-# unit takes 9 s of processor time, six faulty ones 30 s. kinds needs /usr/bin/python3 with OpenCV (python3-opencv). timing: the
+# unit takes 9 s of processor time, six faulty ones 30 s. Changed images need /usr/bin/python3 with
+# OpenCV (python3-opencv). timing: the
 # processor time, pictures included, and how long the verdict takes after the last image, others
 # coming every 50 ms before.
 set -euo pipefail
 cd "$(dirname "$0")/../.."
 PATH=$PWD/build/bin:$PATH
 what=${1:-good} count=${2:-} first=${3:-1}
-declare -A counts=([good]=50 [faulty]=5 [kinds]=1 [mixed]=10 [loose]=5 [sharpness]=1 [timing]=1)
-[ -n "${counts[$what]:-}" ] || { sed -n '5,18s/^# \?//p' "$0"; exit 2; }
+declare -A counts=([good]=50 [faulty]=5 [kinds]=1 [mixed]=10 [loose]=5 [sharpness]=1 [timing]=1 [fixture]=1 [camera]=1 [images]=1)
+[ -n "${counts[$what]:-}" ] || { sed -n '5,22s/^# \?//p' "$0"; exit 2; }
 count=${count:-${counts[$what]}}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -69,11 +73,12 @@ tried() {
   said=$(vlp-station run --station "$work/station/station.yaml" --camera-id "$1-$2" \
     --batch "$work/unit" 2>&1 >"$work/screen" | grep -v ': info: ' || true)
   [ -n "$said" ] || said=$(grep -o '^PASS' "$work/screen" || true)
+  said="$(grep -o -m 1 -E '^(PASS|FAIL|INVALID)' "$work/screen" || true) ${said#*camera*: }"
   local end=''
-  if [[ $said != *"$3"* ]]; then
+  if [[ $said != *$3* ]]; then
     wrong=$((wrong + 1)) end='   NOT AS IT SHOULD'
   fi
-  printf '%-24s %4d   %s%s\n' "$1" "$2" "${said#*camera*: }" "$end"
+  printf '%-24s %4d   %s%s\n' "$1" "$2" "${said/ PASS/}" "$end"
 }
 
 good() {
@@ -273,12 +278,11 @@ kinds() {
     [ ! -e "$work/unit/dispersion/$table.csv" ] || awk -F, -v OFS=, \
       '/^0.*png/ { $3 += 0.02 } { print }' "$work/good/dispersion/$table.csv" >"$work/unit/dispersion/$table.csv"
   done
-  tried station-moved "$seed" 'the reference point or the lamp map is wrong'
+  tried station-moved "$seed" 'positions of the dispersion are off'
   unit_again
   rm -f "$work/unit/check/captures.csv" "$work/unit/check/truth.csv"
   tried no-table "$seed" 'captures have no position'
 
-  # The images.
   unit_again
   rm -r "$work/unit/check"
   cp -r "$work/unit/boards" "$work/unit/check"
@@ -307,6 +311,133 @@ kinds() {
   unit_again
   rm -f "$work"/unit/boards/00[123]?.png
   tried few-boards "$seed" 'boards: too few images'
+}
+
+# good_unit SEED: renders a good unit and keeps it for unit_again.
+good_unit() {
+  scene_of "$1" 514.8 525.2 5 0.7
+  render
+  rm -rf "$work/good"
+  cp -r "$work/unit" "$work/good"
+}
+
+# set_positions STEP AWK: changes the rows of the tables with positions of a step; x and y are the numbers of their
+# columns.
+set_positions() {
+  local table
+  for table in captures truth; do
+    [ ! -e "$work/good/$1/$table.csv" ] || awk -F, -v OFS=, "FNR == 1 { x = \$2 == \"x_m\" ? 2 : 3; y = x + 1 }
+      FNR > 1 { $2 } { print }" "$work/good/$1/$table.csv" >"$work/unit/$1/$table.csv"
+  done
+}
+
+# Faults of lamps and fixture in three sizes, the smallest just outside the gates.
+fixture() {
+  local seed=$1 size lamp=$((1 + $1 % 6)) table
+  good_unit "$seed"
+  for size in 0.004 0.006 0.010; do
+    unit_again
+    awk -v id="$lamp" -v off=$size -F'[][]' '$0 ~ "id: " id "," {
+      split($2, at, ", "); $0 = $1 "[" at[1] + off ", " at[2] ", " at[3] "]" $3 } { print }' \
+      datasets/station/lamps.yaml >"$work/station/lamps.yaml"
+    tried "lamp-off-$size" "$seed" "INVALID*lamp $lamp hangs"
+    station_again
+  done
+  for size in 0.0015 0.003 0.008; do
+    unit_again
+    set_positions check "\$x += $size"
+    tried "fixture-off-$size" "$seed" 'INVALID*positions of the check'
+  done
+  for size in 0.0025 0.004 0.008; do
+    unit_again
+    set_positions dispersion "\$y += $size"
+    tried "reference-off-$size" "$seed" 'INVALID*positions of the dispersion'
+  done
+  unit_again
+  set_positions check '$x *= 1000; $y *= 1000'
+  tried check-in-mm "$seed" 'x_m: the values agree with the fixes if they are in mm'
+  unit_again
+  for table in captures truth; do
+    [ ! -e "$work/good/check/$table.csv" ] ||
+      awk -F, -v OFS=, 'FNR == 1 { print; next } { name[FNR] = $1; sub(/^[^,]*,/, ""); rest[FNR] = $0 }
+        END { for (i = 2; i <= FNR; ++i) print name[i], rest[FNR + 2 - i] }' \
+        "$work/good/check/$table.csv" >"$work/unit/check/$table.csv"
+  done
+  tried check-reversed "$seed" 'INVALID*in reverse order'
+}
+
+# Faults of the camera in three sizes.
+camera() {
+  local seed=$1 size number=0 all="boards rotation dispersion check"
+  for size in 4 5 7; do
+    scene_of $((seed + 3000 + size)) 514.8 525.2 5 0.7
+    scene_change "s/tilt_deg: [0-9.]*\$/tilt_deg: $size/"
+    render
+    tried "tilted-$size" "$seed" 'FAIL*the camera is tilted'
+  done
+  for size in '-0.20, 0.06' '-0.30, 0.10' '-0.25, 0.12'; do
+    number=$((number + 1))
+    scene_of $((seed + 4000 + number)) 514.8 525.2 5 0.7
+    scene_change "s/-0.25, 0.08/$size/"
+    render
+    tried "distortion-$number" "$seed" 'FAIL*of another type'
+  done
+
+  good_unit "$seed"
+  # The sensor and its glass.
+  for size in 10 30 100; do
+    unit_again
+    picture "r = numpy.random.RandomState($seed); image[r.randint(0, 600, $size), r.randint(0, 800, $size)] = 255" $all
+    tried "hot-pixels-$size" "$seed" 'FAIL*defective pixels'
+  done
+  unit_again
+  picture "image[:, 200 + $seed % 400] = 2" $all
+  tried dead-column "$seed" 'FAIL*defective'
+  for size in 0.3 0.5 0.8; do
+    unit_again
+    picture "image = image * (1 - $size * numpy.exp(-((x - 760)**2 + (y - 560)**2) / (2 * 90.0**2)))" $all
+    tried "shaded-corner-$size" "$seed" 'FAIL*shade'
+  done
+  for size in 0.06 0.12 0.25; do
+    unit_again
+    picture "image = image * (1 - $size * ((x - 300 - $seed % 200)**2 + (y - 250)**2 < 25**2))" $all
+    tried "dust-25-px-$size" "$seed" 'FAIL*dust'
+  done
+}
+
+# Settings of the camera and images in three sizes.
+images() {
+  local seed=$1 size lamps="rotation dispersion check" all="boards rotation dispersion check"
+  good_unit "$seed"
+  for size in 0.7 0.5 0.3; do
+    unit_again
+    picture "image = 2 + $size * (image - 2)" $all
+    tried "gain-$size" "$seed" 'INVALID*gain'
+  done
+  for size in 4 8 16; do
+    unit_again
+    picture "image = image + $size" $all
+    tried "black-level-$size" "$seed" 'INVALID*black level'
+  done
+  for size in 0.2 0.1 0.05; do
+    unit_again
+    picture "image = 2 + $size * (image - 2)" boards
+    tried "dark-boards-$size" "$seed" 'INVALID*dark'
+    unit_again
+    picture "image = 2 + $size * (image - 2)" $lamps
+    tried "dark-lamps-$size" "$seed" 'INVALID*dark'
+  done
+
+  for size in 20 40 80; do
+    unit_again
+    picture "image = cv2.resize(image[$size*3//4:-$size*3//4 or None, $size:-$size], None, None, 800 / (800 - 2 * $size), 600 / (600 - 2 * ($size * 3 // 4)))[:600, :800]" $all
+    tried "cropped-$size" "$seed" 'INVALID*scaled'
+  done
+  for size in 5 9 15; do
+    unit_again
+    picture "image = cv2.blur(image, ($size, 1))" $lamps
+    tried "motion-blur-$size" "$seed" 'INVALID*blur'
+  done
 }
 
 # mixed SEED: a good unit with three images of another camera in one step, for each step; expects
@@ -341,12 +472,12 @@ mixed() {
   done
   unit_again
   cp "$work/other/check"/*.png "$work/unit/check/"
-  tried check-whole "$1" 'not judged: the images of check are of another camera'
+  tried check-whole "$1" 'INVALID*the images of check are of another camera'
 }
 
 # loose SEED: a unit that moves before the check, 6 mm sideways or by 0.3 degrees of tilt; expects FAIL.
 loose() {
-  local table tilt expected='fails: all 36 captures of the check are off by'
+  local table tilt expected='the camera moved on its mount'
   scene_of "$1" 514.8 525.2 5 0.7
   render
   rm -rf "$work/good"
@@ -361,7 +492,7 @@ loose() {
       } { print }' "$work/good/check/truth.csv" "$work/good/check/$table.csv" \
       >"$work/unit/check/$table.csv"
   done
-  tried loose-sideways "$1" "$expected 6.0 mm in one direction of the camera"
+  tried loose-sideways "$1" "$expected: in the check, it is displaced by 6.0 mm"
   tilt=$(sed -n 's/.*tilt_deg: \([0-9.]*\)$/\1/p' "$work/scene.yaml")
   scene_change "s/tilt_deg: $tilt\$/tilt_deg: $(awk -v t="$tilt" 'BEGIN { print t + 0.3 }')/"
   render --only check

@@ -82,10 +82,10 @@ TEST(CheckRowTime, MeasuresNoRowTimeFromTwoLamps) {
 TEST(DescribeOtherRowTime, NamesWrongRowTimeWithWhichNoLampIsIdentified) {
   const LampMap map = make_map();
   const std::vector<Observation> images(4, observe(map, {0, 0, 0, 0, 0}, false));
-  EXPECT_THAT(describe_other_row_time(images, map, std::nullopt, {2.2e-5, "camera.yaml"}),
+  EXPECT_THAT(search_row_time(images, map, std::nullopt, {2.2e-5, "camera.yaml"}).error,
               HasSubstr("row time is 22 us in camera.yaml, but the stripes of 5 lamps measure"));
-  EXPECT_EQ(describe_other_row_time(images, map, std::nullopt, {2e-5, "camera.yaml"}), "");
-  EXPECT_EQ(describe_other_row_time({}, map, std::nullopt, {2.2e-5, "camera.yaml"}), "");
+  EXPECT_EQ(search_row_time(images, map, std::nullopt, {2e-5, "camera.yaml"}).error, "");
+  EXPECT_EQ(search_row_time({}, map, std::nullopt, {2.2e-5, "camera.yaml"}).error, "");
 }
 
 /// Periods of lamps 2 to 6 of a map whose frequencies have the ratio 1.2 fit two row times. The

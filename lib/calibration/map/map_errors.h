@@ -118,7 +118,7 @@ struct MapErrorOptions {
 /// Limits:
 ///   - Only horizontal errors are estimated.
 ///   - Captures cannot determine scale, position and rotation of the map. An error of the focal
-///     length acts as one of the scale (station/unit/station_faults.h).
+///     length acts as one of the scale (session/lamp_causes.h).
 ///   - Several lamps that are displaced equally can mask each other.
 ///   - If sd_m is smaller than the true errors of the survey, false alarms are more frequent (3 to
 ///     5 % if the errors are twice as large).

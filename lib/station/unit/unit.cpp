@@ -10,11 +10,12 @@
 
 #include "captures/digest.h"
 #include "frontend/image_source.h"
+#include "geometry/median.h"
 #include "rig/input_error.h"
 #include "session/dispersion_step.h"
 #include "session/rotation_step.h"
 #include "session/session_folder.h"
-#include "station/unit/station_faults.h"
+#include "station/unit/sensor_metrics.h"
 #include "station/unit/unit_metrics.h"
 
 namespace vlp {
@@ -33,6 +34,30 @@ Eigen::Matrix3d get_level_rotation(const LevelRotations& levels, const std::stri
 ImageUse get_image_use(StationStep step) {
   if (step == StationStep::boards) return ImageUse::boards;
   return step == StationStep::rotation ? ImageUse::rotation : ImageUse::known_positions;
+}
+
+std::vector<fs::path> list_used_files(const UnitStep& step) {
+  std::vector<fs::path> files;
+  for (const UnitImage* image : list_used_images(step)) files.push_back(image->observation.file);
+  return files;
+}
+
+void append_metrics(const std::vector<Metric>& metrics, StepResult& result) {
+  result.metrics.insert(result.metrics.end(), metrics.begin(), metrics.end());
+}
+
+/// Returns the metric `lamp_blur_px`; empty without a lamp.
+std::vector<Metric> measure_lamp_blur(const std::vector<const UnitImage*>& images) {
+  constexpr double px_per_sigma = 1.349;  // from 25 % to 75 % of a Gaussian edge
+  std::vector<double> sigmas_px;
+  for (const UnitImage* image : images) {
+    for (const Light& light : image->observation.lights) {
+      if (light.kind == LightKind::lamp && has_outline(light))
+        sigmas_px.push_back(light.rise_px / px_per_sigma);
+    }
+  }
+  if (sigmas_px.empty()) return {};
+  return {{"lamp_blur_px", upper_median(sigmas_px)}};
 }
 
 }  // namespace
@@ -127,8 +152,10 @@ bool Unit::can_no_longer_pass() const {
   const bool stuck = state.sufficient && state.result && !state.result->has_succeeded();
   if (!stuck || *step == StationStep::boards) return false;
   const auto frames = list_used_detections(state);
-  return !list_lamp_map_faults(frames, config_.lamps, *calibration_before(*step)).empty() ||
-         !list_missing_lamps(frames, config_.lamps).empty();
+  const Calibration known = *calibration_before(*step);
+  return !list_map_contradictions(frames, config_.lamps, known).empty() ||
+         !list_missing_lamps(frames, config_.lamps).empty() ||
+         !rank_lamp_causes(list_lamp_captures(*this), config_.lamps, known).empty();
 }
 
 void Unit::add_step_images(StationStep step, const std::vector<fs::path>& files,
@@ -307,11 +334,18 @@ StepResult Unit::run_step(StationStep step, const Calibration& before) const {
     input.camera.id = camera_id_;
     LensResult lens = run_lens_step(std::move(input), make_step_entry(step));
     if (lens.has_succeeded()) add_nominal_differences(config_.nominal_camera, lens);
+    append_metrics(measure_board_levels(list_used_files(state)), lens);
     return lens;
   }
   const LampCaptures captures{list_used_detections(state), config_.lamps, "lamp map", before};
-  if (step == StationStep::rotation)
-    return run_rotation_step(captures, RotationMethod::axis, make_step_entry(step));
+  if (step == StationStep::rotation) {
+    StepResult result = run_rotation_step(captures, RotationMethod::axis, make_step_entry(step));
+    append_metrics(measure_sensor(list_used_files(state),
+                                  list_used_files(this->step_state(StationStep::boards))),
+                   result);
+    append_metrics(measure_lamp_blur(list_used_images(state)), result);
+    return result;
+  }
   const CapturesTable places = read_captures_with_truth(state.folder);
   if (step == StationStep::check) return run_check_step(config_, before, captures.frames, places);
   const KnownPositions known =
@@ -360,6 +394,18 @@ std::vector<Observation> list_lamp_observations(const Unit& unit) {
     std::ranges::move(list_observations(unit.step_state(step)).images, std::back_inserter(images));
   }
   return images;
+}
+
+std::vector<StepCaptures> list_lamp_captures(const Unit& unit) {
+  std::vector<StepCaptures> captures;
+  for (const StationStep step : kStationSteps) {
+    const UnitStep& state = unit.step_state(step);
+    if (step == StationStep::boards || state.images.empty()) continue;
+    captures.push_back({station_step_name(step), list_used_detections(state)});
+    if (step != StationStep::rotation)
+      captures.back().positions = read_captures_with_truth(state.folder);
+  }
+  return captures;
 }
 
 GivenRowTime make_given_row_time(const StationConfig& config) {

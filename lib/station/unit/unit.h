@@ -13,6 +13,7 @@
 #include "evaluation/gate.h"
 #include "frontend/board_intake.h"
 #include "frontend/lamp_intake.h"
+#include "session/lamp_causes.h"
 #include "session/row_time_step.h"
 #include "session/step_history.h"
 #include "station/records/run_record.h"
@@ -125,6 +126,9 @@ class Unit {
 
 /// Returns the observations of the images with lamps, rejected ones too.
 std::vector<Observation> list_lamp_observations(const Unit& unit);
+
+/// Returns the used captures of lamps, with their known positions, of each step that has some.
+std::vector<StepCaptures> list_lamp_captures(const Unit& unit);
 
 /// Returns the row time of the station's type of camera.
 GivenRowTime make_given_row_time(const StationConfig& config);

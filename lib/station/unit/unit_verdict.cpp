@@ -6,7 +6,11 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
+#include <limits>
+#include <numbers>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,10 +18,10 @@
 #include "captures/digest.h"
 #include "rig/yaml_documents.h"
 #include "session/check_outliers.h"
+#include "session/lamp_causes.h"
 #include "session/row_time_step.h"
 #include "session/session_folder.h"
 #include "station/unit/guidance.h"
-#include "station/unit/station_faults.h"
 #include "station/unit/unit_metrics.h"
 
 namespace vlp {
@@ -107,20 +111,109 @@ bool is_gate_missed(const CheckedMetric& metric) {
   return metric.value && !metric.has_passed_gate();
 }
 
-/// Returns the problems of a step and its failed gates, those of the station before those of the
-/// camera.
+/// Returns true if a property of the camera misses its gate by far more than its uncertainty, so
+/// that a failed gate of this uncertainty is no excuse.
+bool is_clearly_missed(const CheckedMetric& metric, const Unit& unit,
+                       const std::vector<Metric>& measured) {
+  if (!is_gate_missed(metric)) return false;
+  const Camera& type = unit.station_config().nominal_camera;
+  const double focal_px = type.focal_px().mean();
+  const double half_diagonal_px = std::hypot(type.imager_px[0], type.imager_px[1]) / 2;
+  struct Accuracy {
+    const char* metric;
+    /// Displacement in the image for a unit of the metric.
+    double px_per_unit;
+    /// Metric of the uncertainty, px.
+    const char* uncertainty;
+  };
+  const auto accuracies =
+      std::to_array<Accuracy>({{"focal_percent", half_diagonal_px / 100, "expected_max_error_px"},
+                               {"principal_point_px", 1, "expected_max_error_px"},
+                               {"nominal_difference_px", 1, "expected_max_error_px"},
+                               {"tilt_deg", focal_px * std::numbers::pi / 180, "rotation_sd_px"}});
+  const auto accuracy = std::ranges::find(accuracies, metric.name, &Accuracy::metric);
+  if (accuracy == accuracies.end()) return false;
+  constexpr double sigmas = 5;
+  return accuracy->px_per_unit * (*metric.value - metric.acceptance_limit()) >
+         sigmas * find_metric_value(measured, accuracy->uncertainty).value_or(0);
+}
+
+/// Returns the problems of a step and its failed gates: properties of the camera that are measured
+/// well enough, then the station, then the camera.
 std::vector<Cause> list_step_causes(const Unit& unit, StationStep step,
                                     const std::vector<CheckedMetric>& metrics) {
   std::vector<Cause> causes = list_step_problems(unit, step);
   const UnitStep& state = unit.step_state(step);
   if (!is_result_valid(state)) return causes;
-  for (const bool of_camera : {false, true}) {
+  const std::vector<Metric>& measured = state.result->metrics;
+  std::set<std::string> listed;
+  const auto append_failures = [&](bool of_camera, const auto& is_selected) {
     append_causes(causes, describe_failures(metrics, of_camera, [&](const CheckedMetric& metric) {
-                    return find_metric_value(state.result->metrics, metric.name) &&
-                           !metric.has_passed_gate() &&
-                           find_metric_kind(metric.name)->is_camera_property == of_camera;
+                    return find_metric_value(measured, metric.name) && !metric.has_passed_gate() &&
+                           find_metric_kind(metric.name)->is_camera_property == of_camera &&
+                           is_selected(metric) && listed.insert(metric.name).second;
                   }));
-  }
+  };
+  append_failures(
+      true, [&](const CheckedMetric& metric) { return is_clearly_missed(metric, unit, measured); });
+  const auto is_any = [](const CheckedMetric&) { return true; };
+  append_failures(false, is_any);
+  append_failures(true, is_any);
+  return causes;
+}
+
+/// Searches the row time by which the lights of all steps are lamps of the map.
+RowTimeCheck search_unit_row_time(const Unit& unit, const Calibration& calibration) {
+  const Camera& camera = calibration.camera;
+  return search_row_time(list_lamp_observations(unit), unit.station_config().lamps,
+                         Lens(camera.lens_model, camera.intrinsics),
+                         make_given_row_time(unit.station_config()));
+}
+
+/// Describes images that were cropped or binned, and scaled: focal length and row time then differ
+/// from those of the type by reciprocal factors. Returns an empty string otherwise.
+std::string describe_scaled_images(const Unit& unit) {
+  const auto known = unit.latest_calibration();
+  if (!known) return "";
+  const Camera& type = unit.station_config().nominal_camera;
+  const double scale = std::sqrt((known->camera.focal_px().cwiseQuotient(type.focal_px())).prod());
+  constexpr double min_difference = 0.02, max_mismatch = 0.01, sigmas = 3;
+  if (std::abs(scale - 1) < min_difference) return "";
+  const std::optional<RowTime> measured = search_unit_row_time(unit, *known).measured;
+  if (!measured) return "";
+  const double rows = type.row_time_s.value() / measured->row_time_s;
+  if (std::abs(rows / scale - 1) > max_mismatch + sigmas * measured->sd_s / measured->row_time_s)
+    return "";
+  // [STATION-22] `images are scaled`
+  return fmt::format(
+      "the images are scaled by {:.3f}: focal length and rows per second of the stripes are both "
+      "larger by this factor than those of the type; take whole images of full resolution",
+      scale);
+}
+
+/// Returns faults of the images as such, on which all results depend: levels, defective pixels,
+/// images that were scaled.
+std::vector<Cause> list_image_causes(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
+  const auto is_missed = [&](const CheckedMetric& metric, std::string_view name) {
+    return metric.name == name && is_gate_missed(metric);
+  };
+  const auto is_dark = [&](const CheckedMetric& metric) {
+    return is_missed(metric, "board_white") || is_missed(metric, "lamp_white");
+  };
+  std::vector<Cause> causes;
+  // [STATION-22] `all images are dark` | settings of the camera or of the
+  //   capture tool changed | restore them
+  if (std::ranges::count_if(metrics, is_dark) > 1)
+    causes.push_back({"all images are dark: the gain of the camera, or each exposure, is too low"});
+  if (std::string scaled = describe_scaled_images(unit); !scaled.empty())
+    causes.push_back({std::move(scaled)});
+  append_causes(causes, describe_failures(metrics, false, [&](const CheckedMetric& metric) {
+                  return is_dark(metric) || is_missed(metric, "dark_level") ||
+                         is_missed(metric, "lamp_blur_px");
+                }));
+  append_causes(causes, describe_failures(metrics, true, [&](const CheckedMetric& metric) {
+                  return is_missed(metric, "defective_pixels");
+                }));
   return causes;
 }
 
@@ -166,65 +259,69 @@ std::vector<Cause> list_lamp_causes(const Unit& unit, const std::vector<CheckedM
   return causes;
 }
 
-/// Returns faults of the known points, of the images of the check, or of the camera in the check.
-std::vector<Cause> list_check_faults(const Unit& unit, const Calibration& calibration) {
-  const UnitStep& check = unit.step_state(StationStep::check);
-  if (!is_result_valid(check)) return {};
-  const LampMap& lamps = unit.station_config().lamps;
-  const CapturesWithPositions captures{list_used_detections(check),
-                                       read_captures_with_truth(check.folder)};
-  // A common offset is no fault of single captures; one that rotates is a fault of the camera.
-  const EvaluationInput input =
-      locate_known_points(unit.station_config(), calibration, captures.frames, captures.positions)
-          .input;
-  const auto offset = find_common_offset(input);
-  if (offset && !offset->in_camera) return {{describe_common_offset(*offset)}};
-  if (!offset) {
-    std::string fault = describe_wrong_positions(input);
-    if (!fault.empty()) return {{std::move(fault)}};
-  }
-  const UnitStep& dispersion = unit.step_state(StationStep::dispersion);
-  const CapturesWithPositions reference{list_used_detections(dispersion),
-                                        read_captures_with_truth(dispersion.folder)};
-  std::string other = explain_focal_difference(captures, reference, lamps, calibration);
-  // Without an offset, residuals can be caused by a lens that is inaccurate near the corners.
-  if (other.empty() && offset) {
-    other = explain_other_lens(captures.frames, reference.frames, lamps, calibration);
-  }
-  if (!other.empty()) {
-    return {{"the images of check are of another camera: " + other + "; take them with this unit"}};
-  }
-  if (offset) return {{describe_common_offset(*offset), true}};
-  return {};
+/// Returns true if the captures of the lamps contradict each other, the map or known positions: a
+/// step failed, or a gate of a residual or of an error.
+bool are_lamps_contradicted(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
+  const bool has_failed_step = std::ranges::any_of(kLampSteps, [&](StationStep step) {
+    const auto& result = unit.step_state(step).result;
+    return result && !result->has_succeeded();
+  });
+  constexpr std::array names{"rotation_px", "rotation_spread_px", "dispersion_mm",
+                             "dispersion_offset_px", "world_offset_mm"};
+  return has_failed_step || std::ranges::any_of(metrics, [&](const CheckedMetric& metric) {
+           return is_gate_missed(metric) &&
+                  (metric.name.starts_with("check_") || std::ranges::count(names, metric.name) > 0);
+         });
 }
 
-/// Returns faults of the lamps and of the lens, from the captures of all steps. Without these,
-/// returns faults of the known points or of the camera in the check.
-std::vector<Cause> list_station_faults(const Unit& unit) {
+/// Returns the limit of a gate, m; infinite without the gate.
+double find_gate_limit_m(const StationConfig& config, const std::string& metric) {
+  const auto gate = std::ranges::find(config.gates, metric, &Gate::metric);
+  constexpr double m_per_mm = 1e-3;
+  return gate == config.gates.end() ? std::numeric_limits<double>::infinity()
+                                    : m_per_mm * gate->limit;
+}
+
+/// Returns wrong positions of single captures of the check; empty if there are none.
+std::string describe_check_outliers(const Unit& unit, const Calibration& calibration) {
+  const UnitStep& check = unit.step_state(StationStep::check);
+  if (!is_result_valid(check)) return "";
+  const StationConfig& config = unit.station_config();
+  return describe_wrong_positions(
+      locate_known_points(config, calibration, list_used_detections(check),
+                          read_captures_with_truth(check.folder))
+          .input,
+      std::min(kMinOutlierError_m, find_gate_limit_m(config, "check_worst_mm")));
+}
+
+/// Returns faults of the station or of the camera from the captures of lamps of all steps.
+std::vector<Cause> list_lamp_faults(const Unit& unit, const std::vector<CheckedMetric>& metrics) {
   const auto known = unit.latest_calibration();
   if (!known) return {};
+  const LampMap& lamps = unit.station_config().lamps;
   // Tested first, because a wrong row time confuses or removes lamps.
-  const Lens lens(known->camera.lens_model, known->camera.intrinsics);
-  std::string row_time =
-      describe_other_row_time(list_lamp_observations(unit), unit.station_config().lamps, lens,
-                              make_given_row_time(unit.station_config()));
+  std::string row_time = search_unit_row_time(unit, *known).error;
   if (!row_time.empty()) return {{std::move(row_time)}};
+  std::vector<StepCaptures> steps = list_lamp_captures(unit);
   std::vector<Frame> frames;
-  for (const StationStep step : kLampSteps) {
-    for (Frame& frame : list_used_detections(unit.step_state(step)))
-      frames.push_back(std::move(frame));
-  }
+  for (const StepCaptures& step : steps)
+    frames.insert(frames.end(), step.frames.begin(), step.frames.end());
   std::vector<Cause> causes;
-  for (const auto& faults : {list_lamp_map_faults(frames, unit.station_config().lamps, *known),
-                             list_missing_lamps(frames, unit.station_config().lamps)}) {
+  for (const auto& faults :
+       {list_map_contradictions(frames, lamps, *known), list_missing_lamps(frames, lamps)}) {
     for (const std::string& fault : faults) causes.push_back({fault});
   }
-  if (!causes.empty()) return causes;
-  if (std::string fault = explain_lens_contradiction(frames, unit.station_config().lamps, *known);
-      !fault.empty()) {
-    return {{std::move(fault)}};
+  if (!causes.empty() || !are_lamps_contradicted(unit, metrics)) return causes;
+  // Single captures with errors can be the effect of another cause, or the cause itself.
+  constexpr double min_explained = 0.9;
+  std::vector<LampCause> ranked = rank_lamp_causes(steps, lamps, *known);
+  if (ranked.empty() || ranked.back().explained < min_explained) {
+    std::string outliers = describe_check_outliers(unit, *known);
+    if (!outliers.empty()) causes.push_back({std::move(outliers)});
   }
-  return list_check_faults(unit, *known);
+  for (LampCause& cause : ranked)
+    causes.push_back({std::move(cause.text), cause.kind == LampCauseKind::moved_camera});
+  return causes;
 }
 
 }  // namespace
@@ -285,12 +382,13 @@ std::vector<Cause> list_failure_causes(const Unit& unit) {
 
   std::vector<Cause> causes;
   if (!unit.invalid_reason().empty()) causes.push_back({unit.invalid_reason()});
+  append_causes(causes, list_image_causes(unit, metrics));
   append_causes(causes,
                 board_causes);  // before faults of the lamps: the lens was measured without them
   if (std::string error = unit.row_time_check().error; !error.empty()) {
     causes.push_back({std::move(error)});
   } else if (!board_causes.empty() || !lamp_causes.empty()) {
-    append_causes(causes, list_station_faults(unit));
+    append_causes(causes, list_lamp_faults(unit, metrics));
   }
   append_causes(causes, std::move(lamp_causes));
   // Gates of make_row_time_metrics(), which refer to all steps together.

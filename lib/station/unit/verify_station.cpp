@@ -11,9 +11,9 @@
 #include "frontend/image_file.h"
 #include "rig/input_error.h"
 #include "session/check_outliers.h"
+#include "session/lamp_causes.h"
 #include "session/row_time_step.h"
 #include "session/session_folder.h"
-#include "station/unit/station_faults.h"
 #include "station/unit/unit.h"
 #include "station/unit/unit_metrics.h"
 #include "station/unit/unit_verdict.h"
@@ -56,33 +56,38 @@ std::vector<Cause> list_station_causes(const Unit& unit, const Calibration& cali
   std::string row_time_error = unit.row_time_check().error;
   if (row_time_error.empty() && has_failed) {
     const Camera& camera = calibration.camera;
-    row_time_error = describe_other_row_time(list_lamp_observations(unit), config.lamps,
-                                             Lens(camera.lens_model, camera.intrinsics),
-                                             make_given_row_time(config));
+    row_time_error =
+        search_row_time(list_lamp_observations(unit), config.lamps,
+                        Lens(camera.lens_model, camera.intrinsics), make_given_row_time(config))
+            .error;
   }
-  const UnitStep& check = unit.step_state(StationStep::check);
-  const std::vector<Frame> check_frames = list_used_detections(check);
-  std::vector<Frame> frames = list_used_detections(unit.step_state(StationStep::dispersion));
-  frames.insert(frames.end(), check_frames.begin(), check_frames.end());
-  // Independent of the gates: this camera is known.
-  constexpr double min_offset_px = 0.6;
-  auto faults = list_lamp_map_faults(frames, config.lamps, calibration, min_offset_px);
+  const std::vector<StepCaptures> steps = list_lamp_captures(unit);
+  std::vector<Frame> frames;
+  for (const StepCaptures& step : steps)
+    frames.insert(frames.end(), step.frames.begin(), step.frames.end());
+  std::vector<Cause> causes;
+  if (!row_time_error.empty()) causes.push_back({row_time_error, false});
+  std::vector<std::string> faults = list_map_contradictions(frames, config.lamps, calibration);
   if (has_failed) {
     // If all gates pass, they decide whether all lamps must be detected.
     std::ranges::move(list_missing_lamps(frames, config.lamps), std::back_inserter(faults));
   }
-  std::vector<Cause> causes;
-  if (!row_time_error.empty()) causes.push_back({row_time_error, false});
   for (const std::string& fault : faults) causes.push_back({fault, true});
   if (!faults.empty()) return causes;
-  const EvaluationInput input =
-      locate_known_points(config, calibration, check_frames, read_captures_with_truth(check.folder))
-          .input;
-  const auto offset = find_common_offset(input);
-  if (offset && has_failed) {
-    causes.push_back({describe_common_offset(*offset), true});
-  } else if (std::string fault = describe_wrong_positions(input); !fault.empty()) {
-    causes.push_back({std::move(fault), false});
+  const StepCaptures& check = steps.back();
+  std::string outliers = describe_wrong_positions(
+      locate_known_points(config, calibration, check.frames, check.positions).input);
+  if (!outliers.empty()) {
+    causes.push_back({std::move(outliers), false});
+    return causes;
+  }
+  // Independent of the gates for lamps: this camera is known.
+  const CauseOptions options{.camera_is_known = true, .min_lamp_offset_px = 0.6};
+  for (LampCause& cause : rank_lamp_causes(steps, config.lamps, calibration, options)) {
+    if (has_failed || cause.kind == LampCauseKind::moved_lamp) {
+      causes.push_back({std::move(cause.text), cause.kind != LampCauseKind::other_camera &&
+                                                   cause.kind != LampCauseKind::other_lens});
+    }
   }
   return causes;
 }

@@ -275,7 +275,7 @@ TEST(WriteRuns, WritesMetricsAndSelectedTextsAsCsv) {
   EXPECT_EQ(
       first_line(csv),
       "run,kind,station,camera,operator_name,shift,begun_utc,ended_utc,verdict,causes,program,"
-      "config_sha256,"
+      "config_sha256,board_white,lamp_white,dark_level,defective_pixels,lamp_blur_px,"
       "blur_px,focal_percent,principal_point_px,nominal_difference_px,board_warp_mm,mtf50_"
       "asymmetry,mtf50,"
       "local_loss,local_shadow,mtf50_worst_ratio,black_ratio,rms_px,board_print_px,expected_max_"

@@ -91,7 +91,7 @@ TEST_F(StationUnitTest, VerdictIsInvalidWhenUnitIsEndedEarly) {
   for (const ScreenLine& line : make_verdict_screen(record)) screen += line.text + "\n";
   EXPECT_THAT(screen,
               AllOf(HasSubstr("INVALID   camera"),
-                    HasSubstr("Gates    not measured: 27 gates, because boards did not finish\n"),
+                    HasSubstr("Gates    not measured: 33 gates, because boards did not finish\n"),
                     HasSubstr("Cause    boards: the operator ended"), Not(HasSubstr("NOT MET"))));
 }
 
