@@ -17,7 +17,7 @@ namespace vlp {
 /// The limit of an error is the measured value plus z sqrt(2) times its standard error, which comes
 /// from its bootstrap interval (bootstrap_intervals()). With z = 3.09, another run of the
 /// same accuracy exceeds it with a probability of 0.1 %. For 40 clusters the probability is 0.5 %,
-/// since their intervals are too narrow.
+/// since their standard errors are estimates.
 ///
 /// The margin is at least 1 % and 1 um (0.001 degrees), and limits are rounded up to three digits.
 /// The limit of `missing_fraction` is the measured fraction, rounded up to a millionth.

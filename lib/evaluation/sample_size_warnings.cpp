@@ -9,7 +9,7 @@
 namespace vlp {
 namespace {
 
-/// Number of clusters from which percentile intervals are nearly as wide as they should be, see
+/// Number of clusters from which the interval of p90 is nearly as wide as it should be, see
 /// bootstrap_intervals().
 constexpr std::size_t kSufficientClusters = 50;
 
@@ -53,22 +53,17 @@ std::vector<std::string> warn_about_sample_size(const Evaluation& evaluation) {
     warnings.push_back("there are too few " + resampling_unit + " with a fix for intervals");
   } else if (intervals->clusters <
              (evaluation.reference == "truth" ? kSufficientClusters : kPathRuns)) {
-    const std::string p90 =
-        intervals->p90 ? ", that of p90 most"
-                       : ", and p90 has none, which needs " + std::to_string(kMinClustersForP90);
     warnings.push_back(describe_small_sample(intervals->clusters, resampling_unit) +
-                       "intervals are somewhat too narrow" + p90);
+                       (intervals->p90 ? "the interval of p90 is somewhat too narrow"
+                                       : "p90 has no interval, which needs " +
+                                             std::to_string(kMinClustersForP90)));
   }
-  if (const auto& comparison = evaluation.comparison; !comparison) {
-    return warnings;
-  } else if (comparison->horizontal().has_too_few_clusters()) {
+  if (const auto& comparison = evaluation.comparison;
+      comparison && comparison->horizontal().has_too_few_clusters()) {
     // [GATE-2] `is inconclusive`
     warnings.push_back(describe_small_sample(comparison->horizontal().clusters, resampling_unit) +
                        "with a fix in both files the comparison is inconclusive; it needs " +
                        std::to_string(kMinClustersCompared));
-  } else if (comparison->horizontal().clusters < kSufficientClusters) {
-    warnings.push_back(describe_small_sample(comparison->horizontal().clusters, resampling_unit) +
-                       "with a fix in both files the difference's interval is somewhat too narrow");
   }
   return warnings;
 }

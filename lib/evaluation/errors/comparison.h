@@ -15,10 +15,9 @@
 
 namespace vlp {
 
-/// Minimum number of clusters for a verdict other than "inconclusive", since percentile intervals
-/// from few clusters are too narrow. Without any difference, "better" or "worse" would result in 17
-/// / 11 / 9 / 8 / 6 % of 2,000 cases. The cases had 5 / 8 / 10 / 20 / 50 clusters with one
-/// horizontal error each; 5 % would be nominal.
+/// Minimum number of clusters for a verdict other than "inconclusive": a difference at fewer points
+/// may not hold for the floor. Without any difference, "better" or "worse" results in 6 % of 2,000
+/// cases with 20 or 50 clusters and one horizontal error each; 5 % would be nominal.
 inline constexpr std::size_t kMinClustersCompared = 20;
 
 /// Relevant change of a mean error, as a fraction of the mean error of the other fixes; a smaller
