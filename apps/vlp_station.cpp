@@ -190,8 +190,9 @@ constexpr const char* kMetricHelp = "Metric, such as rms_px or check_mean_mm";
 void add_statistics_commands(CLI::App& app, StationRecordsOptions& options) {
   auto* trend = add_records_command(
       app, "trend",
-      "Print the control chart of a metric over the runs; exit code 1 if there is an alarm. Uses "
-      "units of the station that passed, unless --verdict, --kind or --of-station is given",
+      "Print the control chart of a metric over the runs; exit code 1 if there is an alarm in the "
+      "last runs (--window). Uses units of the station that passed, unless --verdict, --kind or "
+      "--of-station is given",
       options);
   trend->add_option("metric", options.metric, kMetricHelp)->required();
   trend->add_option("-o,--output", options.output, "Output file of a plot, .png or .svg");
@@ -200,6 +201,11 @@ void add_statistics_commands(CLI::App& app, StationRecordsOptions& options) {
                    "Alarm rules: western-electric (four rules, default), nelson (eight rules), a "
                    "single rule as nelson-3, or ewma")
       ->option_text("RULE ...");
+  trend
+      ->add_option("--window", options.window,
+                   "Number of last runs whose alarms give exit code 1: those since the last call")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   auto* capability = add_records_command(app, "capability",
                                          "Print Cpk and Ppk, with 95 % intervals, of metrics that "
                                          "have gates. Uses judged units of the station",

@@ -81,7 +81,7 @@ SECTIONS = {
 CLEAR = [
     "'@' is %40",
     "a quote ",
-    "alarms, the last",
+    "runs, the last",
     "and {} more",
     "another run is at work",
     "are missing",

@@ -192,11 +192,14 @@ TEST_F(VlpStationRecords, TrendAndStudiesUseComparableRunsAndTrendExitsWith1ForO
   EXPECT_THAT(records("trend rms_px --verdict FAIL").output, HasSubstr("2 runs"));
   EXPECT_THAT(records("trend rms_px --kind any").output, HasSubstr("11 runs"));
   EXPECT_THAT(records("trend rms_px --of-station any").output, HasSubstr("11 runs"));
-  add(500, "station-1", "unit", "PASS", {7});
+  add(500, "station-1", "unit", "PASS", {7, 1});
   const auto alarm = records("trend rms_px");
   EXPECT_EQ(alarm.exit_code, 1);
   EXPECT_THAT(alarm.output,
               HasSubstr("2500-01-01T00:00:00Z 500 a 7  western-electric-1: more than 3 sigmas"));
+  const auto earlier = records("trend rms_px --window 1");
+  EXPECT_EQ(earlier.exit_code, 0);
+  EXPECT_THAT(earlier.output, HasSubstr("500 a 7  western-electric-1"));
   EXPECT_THAT(records("trend rms_px --rules nelson ewma").output, HasSubstr("nelson-1: "));
   EXPECT_EQ(records("trend rms_px --rules western-electric-2").exit_code, 0);
   EXPECT_THAT(records("trend rms_px --until 2200-01-01").output,
@@ -204,7 +207,7 @@ TEST_F(VlpStationRecords, TrendAndStudiesUseComparableRunsAndTrendExitsWith1ForO
   EXPECT_EQ(records("list --since 2026-02-30").exit_code, 2);
 
   // Failed units count in the capability; those that were not judged do not.
-  EXPECT_THAT(records("capability rms_px").output, ContainsRegex("rms_px +13 .*<= 0.014 +-"));
+  EXPECT_THAT(records("capability rms_px").output, ContainsRegex("rms_px +14 .*<= 0.014 +-"));
   EXPECT_EQ(records("capability tilt_deg").exit_code, 3);
   for (const int which : {0, 1}) {
     const std::string camera = which == 0 ? "m1" : "m2";

@@ -26,6 +26,8 @@ struct StationRecordsOptions {
   bool remove = false;
   /// trend: rules of the control chart.
   std::vector<std::string> rules{"western-electric"};
+  /// trend: number of last runs whose alarms count; default: the longest Western Electric pattern.
+  std::size_t window = 8;
   /// study: ids of the units; empty: all units with at least two runs.
   std::vector<std::string> units;
   /// study: reference units as UNIT=VALUE, for bias and linearity.
@@ -57,7 +59,7 @@ void export_runs(const StationRecordsOptions& options);
 void import_archive(const StationRecordsOptions& options);
 /// Prints a metric over the runs, with limits and alarms of a control chart, and optionally draws a
 /// plot (vlp-station trend). Default of the filter: units of the station that passed. Throws
-/// GateNotMet if there is an alarm.
+/// GateNotMet if there is an alarm in the last `window` runs.
 void print_metric_trend(const StationRecordsOptions& options);
 /// Prints the capability indices Cpk and Ppk of the metrics that have gates (vlp-station
 /// capability).

@@ -151,9 +151,11 @@ void print_metric_trend(const StationRecordsOptions& options) {
     print_line(fmt::format("{} {} {} {:.4g}  {}: {}", point.ended_utc, point.run, point.camera,
                            point.value, alarm.rule, alarm.description));
   }
-  if (alarms.empty()) return;
-  throw GateNotMet(fmt::format("{}: {} alarms, the last {} at {}", options.metric, alarms.size(),
-                               alarms.back().rule, points[alarms.back().index].run));
+  const auto recent = keep_recent_alarms(alarms, points.size(), options.window);
+  if (recent.empty()) return;
+  throw GateNotMet(fmt::format("{}: {} alarms in the last {} runs, the last {} at {}",
+                               options.metric, recent.size(), options.window, recent.back().rule,
+                               points[recent.back().index].run));
 }
 
 void print_capability(const StationRecordsOptions& options) {

@@ -161,6 +161,12 @@ std::vector<ChartAlarm> list_chart_alarms(std::span<const double> values,
   return alarms;
 }
 
+std::vector<ChartAlarm> keep_recent_alarms(std::vector<ChartAlarm> alarms, std::size_t count,
+                                           std::size_t window) {
+  std::erase_if(alarms, [&](const ChartAlarm& alarm) { return alarm.index + window < count; });
+  return alarms;
+}
+
 void write_trend_plot(const std::filesystem::path& file, const std::string& title,
                       std::span<const TrendPoint> points, std::span<const ChartAlarm> alarms,
                       std::optional<double> gate) {

@@ -60,6 +60,13 @@ struct ChartAlarm {
 std::vector<ChartAlarm> list_chart_alarms(std::span<const double> values,
                                           const std::vector<std::string>& rules);
 
+/// Returns the alarms at the last `window` of `count` values. Earlier alarms were reported before,
+/// and a long history of a good process always has some: without a change the Western Electric
+/// rules have an alarm after 91 normal values on average (average run length), 65 values with a
+/// Rayleigh distribution (lengths of 2-D errors), and 46 half-normal ones (absolute values).
+std::vector<ChartAlarm> keep_recent_alarms(std::vector<ChartAlarm> alarms, std::size_t count,
+                                           std::size_t window);
+
 /// Plots values in their order with mean, limits, alarms and the gate, if any, as .png or .svg.
 /// Throws InputError as write_plot().
 void write_trend_plot(const std::filesystem::path& file, const std::string& title,
