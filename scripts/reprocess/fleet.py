@@ -3,10 +3,14 @@
 """Detects cameras that changed and lamps that were moved, from fleet.csv and lamps.csv.
 
 Each parameter and axis of a camera is tested for a step at each session and for a steady drift, each lamp for a step.
-Test statistics are the difference of the weighted means before and after the step, and the slope, divided by their
-standard deviations; the step with the largest |z| is the change point. The probability of any false alarm in the whole
-fleet is at most FALSE_ALARM_RATE, half of it for drifts and half for steps. A p value is multiplied by the number of
-tests of its kind (Bonferroni), which holds for any correlation of the parameters.
+Deviates z are the difference of the weighted means before and after the step, and the slope, divided by their standard
+deviations. Errors of sessions have heavier tails than a normal distribution. The test statistic is therefore the
+smallest |z| that remains if any one session is left out: one outlier makes neither a step nor a drift, and a step has at
+least MIN_SIDE sessions on each side. The step with the largest statistic is the change point. The probability of any
+false alarm in the whole fleet is at most FALSE_ALARM_RATE, half of it for drifts and half for steps. A p value of z is
+multiplied by the number of tests (Bonferroni). A series of n sessions counts as n / SESSIONS_PER_TEST tests: simulated
+with normal errors and with those of Student's t of 5 degrees of freedom, n = 6 to 60, its probability of a larger
+statistic than 3 to 4 is at most that many times the two-sided tail of a normal deviate.
 
 A detected change is a step, a drift or undecided, by the marginal likelihoods of the two models. Both have a mean and a
 change with the same wide prior; a step also has a date, with equal prior probability for each of its K sessions:
@@ -24,8 +28,8 @@ exp(z^4 v / 2) times as many are beyond z as with the true scale; z = 4.5 and v 
 independent differences would give 1 / (2 n)). Nothing is tested with fewer than MIN_DIFFERENCES differences.
 
 A camera whose sessions scatter more than those of the fleet has its own tau (estimate_camera_taus()), by the squared
-differences between neighboring sessions over all its parameters. The largest OWN_REJECTED of a series are excluded, so
-that a change does not count as scatter. Cameras with fewer than MIN_OWN_SESSIONS sessions have the tau of the fleet.
+differences between neighboring sessions over all its parameters. The largest of a series, with 8 sessions the largest
+two, are excluded, so that a change does not count as scatter. Cameras with fewer than MIN_OWN_SESSIONS sessions have the tau of the fleet.
 
 `min_detectable` is the change of a parameter that is detected with DETECTION_PROBABILITY, for the sessions of the
 median series: a drift, or a step in the middle.
@@ -49,13 +53,15 @@ DETECTION_PROBABILITY = 0.95
 NORMAL = statistics.NormalDist()
 MIN_ODDS = 19  # likelihood ratio at which step or drift is decided
 MIN_DIFFERENCES = 20
+MIN_SIDE = 2  # sessions before and after a step
+SESSIONS_PER_TEST = {"step": 15, "drift": 150}
+REJECTION_LOSS = {"step": 0.5, "drift": 0.8}  # of the power: z increases by this / sqrt(sessions)
 MAX_DIFFERENCES = 4000  # enough for 1 % of tau
 TOLERANCE = 0.01  # of tau^2
 KEPT_FRACTION = 0.95
 VARIANCE_OF_KEPT = 0.7588  # of a normal deviate within 1.96: 1 - 2 * 1.96 phi(1.96) / 0.95
 OWN_P = 0.01  # probability of an unnecessary own tau, which only reduces the sensitivity
-MIN_OWN_SESSIONS = 8
-OWN_REJECTED = 2  # largest differences of a series: a step causes one, an outlier two
+MIN_OWN_SESSIONS = 5
 OWN_VARIANCE_FACTOR = 1.6  # for the sum of squares, as neighboring differences share a session (simulated: 8 to 50)
 MIN_SD_MM = 1e-3
 WITH_LEVER_ARM = ("zenith", "rotation_center", "dispersion_offset")
@@ -115,7 +121,7 @@ def estimate_camera_taus(columns, between):
         tau, differences = between.get(parameter_of(column)), squared_differences(series)
         if tau is None or len(series) < MIN_OWN_SESSIONS:
             continue
-        kept = len(differences) - OWN_REJECTED
+        kept = len(differences) - (2 if len(series) >= 8 else 1)  # a step causes one large difference, an outlier two
         groups[parameter_of(column)].append((differences, kept))
         fraction = (kept + 0.5) / len(differences)  # the limit is between two differences
         expected[parameter_of(column)] += kept * truncated_variance(fraction)
@@ -166,6 +172,45 @@ def compute_drift(times, series):
     slope = sum(weight * (time - middle) * value for weight, time, (value, _) in zip(weights, times, series))
     slope /= sum_of_squares
     return slope * span, span / math.sqrt(sum_of_squares)
+
+
+def count_tests(all_series):
+    """Returns {kind: number of tests of one deviate each with as many false alarms as those of the series}."""
+    sessions = sum(len(series) for series in all_series)
+    return {kind: math.ceil(sessions / number) for kind, number in SESSIONS_PER_TEST.items()}
+
+
+def without_each(entries):
+    """Yields the entries without the first, without the second, and so on."""
+    return (entries[:i] + entries[i + 1 :] for i in range(len(entries)))
+
+
+def least_z(z, others):
+    """Returns the smallest of |z| and of the deviates `others` in the direction of z; 0 if one has the other sign."""
+    return max(0.0, min([abs(z), *(math.copysign(1, z) * other for other in others)]))
+
+
+def least_z_of_step(series, k):
+    """Returns |z| of the step at session k without the session on which it depends most; 0 for one session on a
+    side."""
+    sides = [(sum(1 / sd**2 for _, sd in side), sum(value / sd**2 for value, sd in side)) for side in (series[:k], series[k:])]
+    (before, weighted_before), (after, weighted_after) = sides
+
+    def z(before, weighted_before, after, weighted_after):
+        return (weighted_after / after - weighted_before / before) / math.sqrt(1 / before + 1 / after)
+
+    if not MIN_SIDE <= k <= len(series) - MIN_SIDE:
+        return 0.0
+    rest = [z(before - 1 / sd**2, weighted_before - value / sd**2, after, weighted_after) for value, sd in series[:k]]
+    rest += [z(before, weighted_before, after - 1 / sd**2, weighted_after - value / sd**2) for value, sd in series[k:]]
+    return least_z(z(before, weighted_before, after, weighted_after), rest)
+
+
+def least_z_of_drift(times, series):
+    """Returns |z| of the drift without the session on which it depends most."""
+    rest = [compute_drift(*some) or (0, 1) for some in zip(without_each(times), without_each(series))]
+    change, sd = compute_drift(times, series)
+    return least_z(change / sd, [change / sd for change, sd in rest])
 
 
 def two_sided_p(z):
@@ -243,10 +288,11 @@ def find_change(rows, series, tests):
     significant as the largest step or the drift, whichever is more significant. The kind follows from the likelihoods.
     """
     step_changes, drift_change = list(compute_steps(series)), compute_drift(session_times(rows), series)
-    k, (change, sd) = max(enumerate(step_changes, 1), key=lambda one: abs(one[1][0] / one[1][1]))
-    p = 2 * tests["step"] * two_sided_p(change / sd)
+    z, k = max((least_z_of_step(series, k), k) for k in range(1, len(series)))
+    change, sd = step_changes[k - 1]
+    p = 2 * tests["step"] * two_sided_p(z)
     if drift_change:
-        p = min(p, 2 * tests["drift"] * two_sided_p(drift_change[0] / drift_change[1]))
+        p = min(p, 2 * tests["drift"] * two_sided_p(least_z_of_drift(session_times(rows), series)))
     kind = decide_kind(step_changes, drift_change)
     before, since = rows[k - 1], rows[k]
     if kind == "drift":
@@ -262,9 +308,19 @@ def median_sd(sds):
 
 
 def sd_of_middle_step(series):
-    """Returns the sd of a step in the middle of a series."""
+    """Returns the sd of a step in the middle of a series, increased for the rejected session; None if no such step is
+    tested."""
     half = len(series) // 2
-    return math.sqrt(sum(1 / sum(1 / sd**2 for _, sd in part) for part in (series[:half], series[half:])))
+    if half < MIN_SIDE:
+        return None
+    sd = math.sqrt(sum(1 / sum(1 / sd**2 for _, sd in part) for part in (series[:half], series[half:])))
+    return sd * (1 + REJECTION_LOSS["step"] / math.sqrt(len(series)))
+
+
+def sd_of_drift(times, series):
+    """Returns the sd of a drift; None if all times are equal."""
+    drift = compute_drift(times, series)
+    return drift and drift[1] * (1 + REJECTION_LOSS["drift"] / math.sqrt(len(series)))
 
 
 def compute_min_detectable(all_series, between, tests):
@@ -274,7 +330,7 @@ def compute_min_detectable(all_series, between, tests):
     found = {}
     for name in (name for name in TRACKED_UNITS if between[name] is not None):
         of_kind = [(times, with_added_sd(series, between[name])) for kind, times, series in all_series if kind == name]
-        sds = {"drift": median_sd([lambda of=of: (compute_drift(*of) or (0, None))[1] for of in of_kind])}
+        sds = {"drift": median_sd([lambda of=of: sd_of_drift(*of) for of in of_kind])}
         sds["step"] = median_sd([lambda of=of: sd_of_middle_step(of[1]) for of in of_kind])
         found[name] = {kind: z[kind] * sd for kind, sd in sds.items() if sd}
     return found
@@ -339,9 +395,6 @@ class Room:
         all_series = [series for lamp in self.series for series in self.axis_series(lamp)]
         return [difference for series in all_series for difference in squared_differences(series)]
 
-    def count_tests(self):
-        return sum(len(series) - 1 for series in self.series.values())
-
     def influence(self, session, of, moved):
         """Returns the ratio of the apparent offset of lamp `of` to the displacement of lamp `moved` in a session."""
         lamps = self.sessions[session]["lamps"]
@@ -361,8 +414,11 @@ class Room:
         best = None
         for lamp in sorted(self.series):
             x, y = (compute_steps(series) for series in self.axis_series(lamp, tau))
+            axes = self.axis_series(lamp, tau)
             for k, ((dx, sx), (dy, sy)) in enumerate(zip(x, y), 1):
-                chi2 = (dx / sx) ** 2 + (dy / sy) ** 2
+                if best and (dx / sx) ** 2 + (dy / sy) ** 2 <= best[0]:
+                    continue
+                chi2 = sum(least_z_of_step(axis, k) ** 2 for axis in axes)
                 if best is None or chi2 > best[0]:
                     best = (chi2, lamp, k, complex(dx, dy), (sx, sy))
         return best
@@ -412,8 +468,8 @@ def analyze_fleet(rows, lamp_rows):
     tau_mm = estimate_tau([one for room in rooms for one in room.squared_differences()]) if has_enough_pairs else None
     between["lamps"] = tau_mm
     tried = [series for kind, _, series in all_series if between[kind] is not None]
-    tests = {"drift": len(tried), "step": sum(len(series) - 1 for series in tried)}
-    tests["step"] += sum(room.count_tests() for room in rooms) if tau_mm is not None else 0
+    tests, of_lamps = count_tests(tried), [series for room in rooms for series in room.series.values()]
+    tests["step"] += count_tests(of_lamps)["step"] if tau_mm is not None else 0
     min_detectable, moved = compute_min_detectable(all_series, between, tests), []
     if tau_mm is not None:
         min_detectable["lamps"] = compute_min_detectable_of_lamps(rooms, tau_mm, tests)

@@ -21,20 +21,30 @@ class Fleet:
     moved    [(room, lamp, day, displacement in mm as a complex number)]
     honest   sessions scatter by their reported standard deviations
     unequal  sessions report 1 / unequal to unequal times SDS, and scatter by these and by the same sd between sessions
-    noisy    cameras whose sessions scatter three times as much
+    noisy    cameras whose sessions scatter NOISY times as much
+    tails    degrees of freedom of errors with Student's t, of the same standard deviation; 0: normal
+    understated   ratio of the actual to the reported standard deviations
     """
 
     def __init__(
-        self, seed, cameras=20, sessions=10, drifts=(), broken=(), moved=(), honest=False, unequal=1, noisy=()
+        self, seed, cameras=20, sessions=10, drifts=(), broken=(), moved=(), honest=False, unequal=1, noisy=(),
+        tails=0, understated=1
     ):
         self.chance = random.Random(seed)
         self.cameras, self.sessions, self.honest, self.unequal = cameras, sessions, honest, unequal
-        self.noisy = frozenset(noisy)
+        self.noisy, self.tails, self.understated = frozenset(noisy), tails, understated
         self.drifts, self.broken, self.moved = dict(drifts), dict(broken), list(moved)
         self.rooms = [self.draw_map_errors() for _ in range(2)]
 
     def draw_map_errors(self):
         return {lamp: complex(self.chance.gauss(0, 0.5), self.chance.gauss(0, 0.5)) for lamp in PLACES}
+
+    def error(self, sd):
+        """Draws an error with this standard deviation."""
+        error = self.chance.gauss(0, sd)
+        if self.tails:
+            error /= math.sqrt(self.chance.gammavariate(self.tails / 2, 2) / (self.tails - 2))
+        return error
 
     def day(self, camera, session):
         return round(365 * (session * self.cameras + camera) / (self.cameras * self.sessions - 1))
@@ -65,8 +75,8 @@ class Fleet:
             since, jump = self.broken.get(camera, (0, {}))
             jump = jump.get(name, (0, 0)) if session >= since else (0, 0)
             elapsed = self.day(camera, session) / 365
-            values = [nominal[name][i] + drift[i] * elapsed + jump[i] + self.chance.gauss(0, scatter) for i in (0, 1)]
-            calibration |= {f"{name}_{unit}": values, f"{name}_sd_{unit}": [sd, sd]}
+            values = [nominal[name][i] + drift[i] * elapsed + jump[i] + self.error(scatter) for i in (0, 1)]
+            calibration |= {f"{name}_{unit}": values, f"{name}_sd_{unit}": [sd / self.understated] * 2}
         room = self.room(camera, session)
         offsets = self.offsets(room, self.day(camera, session))
         lamps = [
@@ -96,7 +106,7 @@ class Fleet:
             if of_room == room and day >= since:
                 now[lamp] += by
         sd = LAMP_SD_MM * (1 if self.honest else LAMP_SCATTER) / 1.4  # includes the noise of the other lamps
-        now = {lamp: error + complex(self.chance.gauss(0, sd), self.chance.gauss(0, sd)) for lamp, error in now.items()}
+        now = {lamp: error + complex(self.error(sd), self.error(sd)) for lamp, error in now.items()}
         offsets = {}
         for lamp in PLACES:
             others = [other for other in PLACES if other != lamp]
