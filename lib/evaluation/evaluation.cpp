@@ -42,7 +42,8 @@ double compute_max_normalized_error(const std::vector<FixRow>& fixes,
                                     const std::vector<FixError>& errors) {
   const auto ratios = normalize_errors(fixes, errors);
   if (!ratios) return 0;
-  return std::max({ratios->horizontal, ratios->height.value_or(0), ratios->yaw.value_or(0)});
+  return std::max({ratios->horizontal.rms, ratios->height.value_or(NormalizedError{}).rms,
+                   ratios->yaw.value_or(NormalizedError{}).rms});
 }
 
 /// Throws InputError if the fixes to compare with have no fix, or cannot be of these captures.
@@ -126,9 +127,12 @@ std::vector<Metric> collect_metrics(const Evaluation& evaluation) {
   if (evaluation.yaw_rad) add("yaw_rms_deg", deg_from_rad(evaluation.yaw_rad->magnitudes.rms));
   add("missing_fraction", evaluation.missing_fix_fraction());
   if (const auto& ratios = evaluation.normalized_errors) {
-    add("normalized_error_rms", ratios->horizontal);
-    if (ratios->height) add("normalized_height_error_rms", *ratios->height);
-    if (ratios->yaw) add("normalized_yaw_error_rms", *ratios->yaw);
+    const auto add_ratio = [&](const char* name, const NormalizedError& error) {
+      metrics.push_back({name, error.rms, error.low});
+    };
+    add_ratio("normalized_error_rms", ratios->horizontal);
+    if (ratios->height) add_ratio("normalized_height_error_rms", *ratios->height);
+    if (ratios->yaw) add_ratio("normalized_yaw_error_rms", *ratios->yaw);
   }
   if (evaluation.crlb_ratio) add("crlb_ratio", evaluation.crlb_ratio->horizontal);
   if (const auto& fit = evaluation.line_fit) {

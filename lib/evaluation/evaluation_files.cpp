@@ -82,13 +82,19 @@ Json to_json(const LineFit& fit) {
 }
 
 Json to_json(const NormalizedErrors& normalized_errors) {
-  Json json{{"horizontal", normalized_errors.horizontal}, {"fixes", normalized_errors.fixes}};
-  if (normalized_errors.height) json["height"] = *normalized_errors.height;
-  if (normalized_errors.yaw) json["yaw"] = *normalized_errors.yaw;
-  json["within_95"] = normalized_errors.within_95;
-  if (normalized_errors.height_within_95)
-    json["height_within_95"] = *normalized_errors.height_within_95;
-  if (normalized_errors.yaw_within_95) json["yaw_within_95"] = *normalized_errors.yaw_within_95;
+  const auto& [horizontal, fixes, height, yaw] = normalized_errors;
+  Json json{{"horizontal", horizontal.rms},
+            {"horizontal_low", horizontal.low},
+            {"within_95", horizontal.within_95},
+            {"fixes", fixes}};
+  const auto add = [&](const std::string& name, const std::optional<NormalizedError>& error) {
+    if (!error) return;
+    json[name] = error->rms;
+    json[name + "_low"] = error->low;
+    json[name + "_within_95"] = error->within_95;
+  };
+  add("height", height);
+  add("yaw", yaw);
   return json;
 }
 
@@ -132,6 +138,7 @@ Json to_json(const std::vector<CheckedMetric>& gates) {
                     {"limit", gate.limit.value()},
                     {"direction", describe_direction(gate.direction)},
                     {"passed", gate.has_passed_gate()}});
+    if (gate.interval_low) list.back()["interval_low"] = *gate.interval_low;
   }
   return list;
 }

@@ -44,7 +44,11 @@ std::string describe_limit(const MetricKind& kind, double limit) {
 }
 
 CheckedMetric check_metric(const MetricKind& kind, const std::vector<Metric>& metrics) {
-  return {kind.name, kind.unit, find_metric_value(metrics, kind.name), {}, kind.direction};
+  CheckedMetric checked{
+      kind.name, kind.unit, find_metric_value(metrics, kind.name), {}, kind.direction};
+  const auto metric = std::ranges::find(metrics, kind.name, &Metric::name);
+  if (metric != metrics.end()) checked.interval_low = metric->interval_low;
+  return checked;
 }
 
 }  // namespace
@@ -58,7 +62,7 @@ bool CheckedMetric::has_passed_gate() const {
   if (!limit) return true;
   if (!value) return false;
   return direction == Direction::at_least ? *value >= acceptance_limit()
-                                          : *value <= acceptance_limit();
+                                          : interval_low.value_or(*value) <= acceptance_limit();
 }
 
 std::optional<double> CheckedMetric::conformance_probability() const {
@@ -183,6 +187,9 @@ std::vector<CheckedMetric> check_against_gates(const std::vector<Gate>& gates,
 
 std::string describe_gate(const CheckedMetric& gate) {
   return gate.name + " is " + (gate.value ? with_unit(*gate.value, gate.unit) : "not known") +
+         (gate.interval_low
+              ? " (95 % interval from " + with_unit(*gate.interval_low, gate.unit) + ")"
+              : "") +
          ", " + describe_direction(gate.direction) + " " +
          with_unit(gate.limit.value(), gate.unit) + describe_guard_band(gate) + " is required";
 }

@@ -45,6 +45,8 @@ struct CheckedMetric {
   std::optional<double> limit;
   Direction direction;
   std::optional<GuardBand> guard_band = {};
+  /// Metric::interval_low, which the gate then limits instead of the value.
+  std::optional<double> interval_low = {};
 
   /// Returns the limit tightened by its guard band.
   /// @pre there is a gate

@@ -156,7 +156,8 @@ constexpr auto kMetricKinds = std::to_array<MetricKind>({
     {"missing_fraction", "", evaluation, "fraction of the captures without a fix, from 0 to 1",
      "captures have no fix", at_most, 1},
     {"normalized_error_rms", "", evaluation,
-     "RMS of horizontal errors / reported sd; needs ground truth and sd columns",
+     "RMS of horizontal errors / reported sd; needs ground truth and sd columns; gate on the lower "
+     "limit of its 95 % interval, since errors of one unit are correlated",
      "the errors are larger than the fixes report: a wrong table, lens or map?"},
     {"normalized_height_error_rms", "", evaluation, "the same for the height",
      "the heights are wrong: the lens, or its boards, of another camera?"},

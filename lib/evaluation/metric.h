@@ -58,6 +58,8 @@ std::optional<MetricKind> find_metric_kind(const std::string& name);
 struct Metric {
   std::string name;
   double value;
+  /// Lower limit of the 95 % interval of the value, if its gate applies to that limit.
+  std::optional<double> interval_low = {};
 };
 
 /// Returns the value of a metric; std::nullopt if it was not measured or is not finite.

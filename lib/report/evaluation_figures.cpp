@@ -89,7 +89,7 @@ std::vector<ReportStatistic> list_statistics(const Evaluation& evaluation) {
   }
   if (evaluation.normalized_errors) {
     figures.push_back({"error / reported standard deviation (1: correct)",
-                       format_number(evaluation.normalized_errors->horizontal), "", ""});
+                       format_number(evaluation.normalized_errors->horizontal.rms), "", ""});
   }
   if (evaluation.crlb_ratio) {
     figures.push_back(make_length_statistic("theoretical limit", evaluation.crlb_ratio->crlb_m));

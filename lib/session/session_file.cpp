@@ -125,7 +125,9 @@ StepResult parse_result(const Json& json) {
                           json.at("file").get<std::string>());
   for (const Json& metric : json.at("metrics")) {
     result.metrics.push_back(
-        {metric.at("name").get<std::string>(), number_or_nan(metric.at("value"))});
+        {metric.at("name").get<std::string>(), number_or_nan(metric.at("value")), {}});
+    if (metric.contains("interval_low"))
+      result.metrics.back().interval_low = metric.at("interval_low").get<double>();
   }
   json.at("warnings").get_to(result.warnings);
   json.at("notes").get_to(result.notes);
@@ -148,12 +150,14 @@ StepResult parse_result(const Json& json) {
 }  // namespace
 
 Json make_gate_json(const CheckedMetric& gate) {
-  return {{"name", gate.name},
-          {"unit", gate.unit},
-          {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
-          {"limit", gate.limit ? Json(*gate.limit) : Json(nullptr)},
-          {"direction", describe_direction(gate.direction)},
-          {"passed", gate.has_passed_gate()}};
+  Json json{{"name", gate.name},
+            {"unit", gate.unit},
+            {"value", gate.value ? Json(*gate.value) : Json(nullptr)},
+            {"limit", gate.limit ? Json(*gate.limit) : Json(nullptr)},
+            {"direction", describe_direction(gate.direction)},
+            {"passed", gate.has_passed_gate()}};
+  if (gate.interval_low) json["interval_low"] = *gate.interval_low;
+  return json;
 }
 
 Json make_step_json(const StepResult& result) {
@@ -166,8 +170,9 @@ Json make_step_json(const StepResult& result) {
             {"skipped", Json::array()},
             {"rejected_lamps", Json::array()},
             {"lamp_offsets", Json::array()}};
-  for (const auto& [name, value] : result.metrics) {
+  for (const auto& [name, value, interval_low] : result.metrics) {
     json["metrics"].push_back({{"name", name}, {"value", json_number_or_null(value)}});
+    if (interval_low) json["metrics"].back()["interval_low"] = *interval_low;
   }
   for (const auto& [image, reason] : result.skipped) {
     json["skipped"].push_back({{"image", image}, {"reason", reason}});

@@ -54,13 +54,13 @@ std::vector<Gate> make_step_gates(const std::vector<Metric>& metrics) {
   };
   std::vector<Gate> gates{{"row_time_error_percent", 100 * kLampDrift},
                           {"dispersion_offset_px", 3}};
-  if (exceeds_reference_error("rms_mm")) gates.push_back({"normalized_error_rms", 5});
+  if (exceeds_reference_error("rms_mm")) gates.push_back({"normalized_error_rms", 3});
   if (exceeds_reference_error("height_rms_mm")) {
-    gates.push_back({"normalized_height_error_rms", 10});
+    gates.push_back({"normalized_height_error_rms", 5});
   }
   constexpr double max_yaw_error_deg = 5;  // of a heading that is set by hand
   if (find_metric_value(metrics, "yaw_rms_deg").value_or(max_yaw_error_deg) >= max_yaw_error_deg) {
-    gates.push_back({"normalized_yaw_error_rms", 10});
+    gates.push_back({"normalized_yaw_error_rms", 5});
   }
   std::erase_if(gates, [&](const Gate& gate) { return !find_metric_value(metrics, gate.metric); });
   return gates;

@@ -93,8 +93,9 @@ def read_calibration(session):
 
 
 def gate_metrics(session):
-    """Returns the metrics and gates of session.json, for --session-gates: {name: value} and {name: limit}, as JSON."""
-    metrics = {metric["name"]: metric["value"] for metric in session["metrics"]}
+    """Returns the metrics and gates of session.json, for --session-gates: {name: value} and {name: limit}, as JSON. The
+    gate of a metric with an interval limits its lower end."""
+    metrics = {metric["name"]: metric.get("interval_low", metric["value"]) for metric in session["metrics"]}
     gates = {gate["name"]: gate["limit"] for gate in session.get("gates", [])}
     return json.dumps({"metrics": metrics, "gates": gates}, separators=(",", ":"))
 

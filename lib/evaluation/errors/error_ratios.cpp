@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "evaluation/errors/error_ratios.h"
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "camera/lens.h"
 #include "captures/parallel_for.h"
@@ -12,51 +15,75 @@
 namespace vlp {
 namespace {
 
-/// Accumulator of normalized errors: root mean square, and fraction within 95 %.
+/// Returns chi2(0.975; dof) / dof by the approximation of Wilson and Hilferty (1931, PNAS 17,
+/// 684-688): 2 % too small for one degree of freedom, 0.6 % for two.
+double compute_chi_square_ratio(double dof) {
+  const double variance = 2 / (9 * dof);
+  return std::pow(1 - variance + kWithin95 * std::sqrt(variance), 3);
+}
+
+/// Normalized errors of fixes along `axes` axes: x and y, or x alone.
 class Ratios {
  public:
-  void add(double value) {
-    squares_ += value * value;
-    ++count_;
-    if (std::abs(value) <= kWithin95) ++within_;
+  explicit Ratios(int axes) : axes_(axes) {}
+
+  void add(const Eigen::Vector2d& error, double yaw_rad, std::size_t cluster) {
+    errors_.push_back(error);
+    yaws_rad_.push_back(yaw_rad);
+    clusters_.insert(cluster);
   }
-  std::optional<double> value() const {
-    return count_ > 0 ? std::optional(std::sqrt(squares_ / static_cast<double>(count_)))
-                      : std::nullopt;
-  }
-  std::optional<double> fraction_within_95() const {
-    return count_ > 0 ? std::optional(static_cast<double>(within_) / static_cast<double>(count_))
-                      : std::nullopt;
+
+  /// Returns std::nullopt if there are no errors.
+  std::optional<NormalizedError> summarize() const {
+    if (errors_.empty()) return std::nullopt;
+    const double count = static_cast<double>(errors_.size()), axes = axes_;
+    Eigen::Vector2d mean = Eigen::Vector2d::Zero(), camera_mean = mean;
+    for (const Eigen::Vector2d& error : errors_) mean += error / count;
+    double mean_square = 0, within = 0;
+    for (std::size_t i = 0; i < errors_.size(); ++i) {
+      mean_square += errors_[i].squaredNorm() / (axes * count);
+      within += static_cast<double>((errors_[i].head(axes_).array().abs() <= kWithin95).count());
+      if (axes_ == 2)
+        camera_mean += Eigen::Rotation2Dd(-yaws_rad_[i]) * (errors_[i] - mean) / count;
+    }
+    const double common = mean.squaredNorm() / axes, in_camera = camera_mean.squaredNorm() / axes;
+    const double scatter = std::max(0.0, mean_square - common - in_camera);
+    const double scatter_dof = axes * std::max(1.0, static_cast<double>(clusters_.size()) - axes);
+    const double variance =
+        (common * common + in_camera * in_camera) / axes + scatter * scatter / scatter_dof;
+    NormalizedError result{std::sqrt(mean_square), 0, within / (axes * count)};
+    if (variance > 0) {
+      const double dof = mean_square * mean_square / variance;
+      result.low = result.rms / std::sqrt(compute_chi_square_ratio(dof));
+    }
+    return result;
   }
 
  private:
-  double squares_ = 0;
-  std::size_t count_ = 0, within_ = 0;
+  int axes_;
+  std::vector<Eigen::Vector2d> errors_;
+  std::vector<double> yaws_rad_;
+  std::set<std::size_t> clusters_;
 };
 
 }  // namespace
 
 std::optional<NormalizedErrors> normalize_errors(const std::vector<FixRow>& fixes,
                                                  const std::vector<FixError>& errors) {
-  Ratios horizontal, height, yaw;
+  Ratios horizontal(2), height(1), yaw(1);
   std::size_t fixes_with_sd = 0;
   for (const FixError& error : errors) {
-    const auto& sd = fixes[error.fix].fix->sd;
-    if (!sd || !(sd->minCoeff() > 0)) continue;
+    const FixRow::Fix& fix = *fixes[error.fix].fix;
+    if (!fix.sd || !(fix.sd->minCoeff() > 0)) continue;
+    const Eigen::Vector4d& sd = *fix.sd;
     ++fixes_with_sd;
-    horizontal.add(error.horizontal_m.x() / (*sd)[0]);
-    horizontal.add(error.horizontal_m.y() / (*sd)[1]);
-    if (error.height_m) height.add(*error.height_m / (*sd)[2]);
-    if (error.yaw_rad) yaw.add(*error.yaw_rad / (*sd)[3]);
+    horizontal.add(error.horizontal_m.cwiseQuotient(sd.head<2>()), fix.pose.yaw_rad, error.cluster);
+    if (error.height_m) height.add({*error.height_m / sd[2], 0}, 0, error.cluster);
+    if (error.yaw_rad) yaw.add({*error.yaw_rad / sd[3], 0}, 0, error.cluster);
   }
   if (fixes_with_sd == 0) return std::nullopt;
-  return NormalizedErrors{*horizontal.value(),
-                          fixes_with_sd,
-                          height.value(),
-                          yaw.value(),
-                          *horizontal.fraction_within_95(),
-                          height.fraction_within_95(),
-                          yaw.fraction_within_95()};
+  return NormalizedErrors{*horizontal.summarize(), fixes_with_sd, height.summarize(),
+                          yaw.summarize()};
 }
 
 bool CrlbRatio::are_errors_below_crlb() const {

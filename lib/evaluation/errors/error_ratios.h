@@ -11,20 +11,29 @@
 
 namespace vlp {
 
-/// Normalized errors: root mean square of error / reported standard deviation. 1 if the reported
-/// values are correct, whatever their correlations; above 1 if errors are larger than reported.
+/// Root mean square of error / reported standard deviation. 1 if the reported values are correct,
+/// whatever their correlations; above 1 if errors are larger than reported.
+struct NormalizedError {
+  double rms = 0;
+  /// Lower limit of the 95 % interval of the ratio of true to reported standard deviations, which
+  /// allows for errors that the fixes have in common: rms sqrt(v / chi2(0.975; v)).
+  ///
+  /// The degrees of freedom v are those of Welch and Satterthwaite (JCGM 100:2008, G.4.1) for the
+  /// mean square, v = rms^4 / sum(c_i^2 / v_i). Its parts c_i are the square of the mean error, of
+  /// the mean error in the frame of the camera (horizontal only), and the scatter, whose v_i is the
+  /// number of clusters less the fitted means. A unit has one calibration: if its error dominates,
+  /// the rms of correct fixes has 1 or 2 degrees of freedom, however many fixes there are.
+  double low = 0;
+  /// Fraction of the errors within kWithin95 standard deviations: 0.95 is expected over many
+  /// cameras; that of one camera may be far from it.
+  double within_95 = 0;
+};
+
+/// Normalized errors of x and y together over `fixes` fixes, height and yaw.
 struct NormalizedErrors {
-  /// Root mean square of error / reported standard deviation, over the x and y of all fixes whose
-  /// reported standard deviations are positive. Their number is `fixes`.
-  double horizontal;  // of x and y
+  NormalizedError horizontal;
   std::size_t fixes;
-  std::optional<double> height, yaw;
-  /// Fractions of the errors within kWithin95 standard deviations: x and y together, height, yaw.
-  /// 0.95 is expected for correct values and normal errors. Errors of one calibration and map are
-  /// correlated: the fraction of one camera may be far from 0.95, that over many cameras should
-  /// not.
-  double within_95;
-  std::optional<double> height_within_95, yaw_within_95;
+  std::optional<NormalizedError> height, yaw;
 };
 /// Number of standard deviations that contain 95 % of a normal distribution.
 inline constexpr double kWithin95 = 1.959964;

@@ -94,18 +94,20 @@ void print_line_fit(const LineFit& fit) {
 
 void print_error_ratios(const Evaluation& evaluation) {
   if (const auto& normalized_errors = evaluation.normalized_errors) {
-    fmt::print("error / sd  horizontal {:.3f}", normalized_errors->horizontal);
-    if (normalized_errors->height) fmt::print(", height {:.3f}", *normalized_errors->height);
-    if (normalized_errors->yaw) fmt::print(", yaw {:.3f}", *normalized_errors->yaw);
-    fmt::print(" (rms; 1 if the reported sd are correct)\n");
-    constexpr double percent = 100;
-    fmt::print("within 95 % horizontal {:.1f} %", percent * normalized_errors->within_95);
-    if (const auto& fraction = normalized_errors->height_within_95) {
-      fmt::print(", height {:.1f} %", percent * *fraction);
-    }
-    if (const auto& fraction = normalized_errors->yaw_within_95)
-      fmt::print(", yaw {:.1f} %", percent * *fraction);
-    fmt::print(" (errors within 1.96 sd; correlated within one calibration)\n");
+    const auto& [horizontal, fixes, height, yaw] = *normalized_errors;
+    std::string ratios = fmt::format("{:.3f}", horizontal.rms);
+    std::string fractions = fmt::format("{:.1f} %", 100 * horizontal.within_95);
+    const auto add = [&](const char* name, const std::optional<NormalizedError>& error) {
+      if (!error) return;
+      ratios += fmt::format(", {} {:.3f}", name, error->rms);
+      fractions += fmt::format(", {} {:.1f} %", name, 100 * error->within_95);
+    };
+    add("height", height);
+    add("yaw", yaw);
+    fmt::print(
+        "error / sd  horizontal {} (rms; 1 if the reported sd are correct)\n"
+        "within 95 % horizontal {} (errors within 1.96 sd; correlated within one calibration)\n",
+        ratios, fractions);
   }
   if (const auto& limit = evaluation.crlb_ratio) {
     fmt::print("limit       {:.3f} mm rms, error / limit {:.3f} ({})\n",

@@ -4,7 +4,12 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <array>
 #include <cmath>
+#include <numbers>
+#include <utility>
+#include <vector>
 
 #include "fix_at.h"
 #include "support/random.h"
@@ -28,15 +33,66 @@ TEST(NormalizeErrors, ReturnsOneIfErrorsMatchReportedSd) {
   }
   const auto ratio = normalize_errors(fixes, errors);
   ASSERT_TRUE(ratio);
-  EXPECT_NEAR(ratio->horizontal, 1, 0.015);     // three standard errors
-  EXPECT_NEAR(ratio->height.value(), 2, 0.05);  // stated too small by a factor of two
+  ASSERT_TRUE(ratio->height);
+  EXPECT_NEAR(ratio->horizontal.rms, 1, 0.015);  // three standard errors
+  EXPECT_NEAR(ratio->height->rms, 2, 0.05);      // stated too small by a factor of two
+  EXPECT_NEAR(ratio->height->low, 2, 0.08);
   EXPECT_FALSE(ratio->yaw);
-  EXPECT_NEAR(ratio->within_95, 0.95, 0.006);
-  EXPECT_NEAR(ratio->height_within_95.value(), std::erf(kWithin95 / 2 / std::sqrt(2)), 0.015);
-  EXPECT_FALSE(ratio->yaw_within_95);
+  EXPECT_NEAR(ratio->horizontal.within_95, 0.95, 0.006);
+  EXPECT_NEAR(ratio->height->within_95, std::erf(kWithin95 / 2 / std::sqrt(2)), 0.015);
   fixes.resize(1);
   fixes[0].fix->sd.reset();
   EXPECT_FALSE(normalize_errors(fixes, {errors[0]}));
+}
+
+/// Returns the fractions of 2,000 units whose lower limit and whose rms exceed 1.2. Each has 36
+/// fixes at 9 points in 4 directions, whose errors are `factor` times the reported sd. Half of
+/// their variance is noise, the others are an error of the calibration, which rotates with the
+/// camera, and of the map.
+std::array<double, 2> fraction_above_gate(double factor, double calibration, double map) {
+  Random random(5);
+  constexpr int units = 2000;
+  int low = 0, rms = 0;
+  for (int unit = 0; unit < units; ++unit) {
+    const Eigen::Vector2d of_camera{random.normal(), random.normal()},
+        of_map{random.normal(), random.normal()};
+    std::vector<FixRow> fixes;
+    std::vector<FixError> errors;
+    for (std::size_t i = 0; i < 36; ++i) {
+      const double yaw_rad = static_cast<double>(i % 4) * std::numbers::pi / 2;
+      fixes.push_back(fix_at("", 0, 0));
+      fixes.back().fix->pose.yaw_rad = yaw_rad;
+      fixes.back().fix->sd = Eigen::Vector4d::Ones();
+      const Eigen::Vector2d noise{random.normal(), random.normal()};
+      errors.push_back(
+          {i,
+           factor * (std::sqrt(1 - calibration - map) * noise +
+                     std::sqrt(calibration) * (Eigen::Rotation2Dd(yaw_rad) * of_camera) +
+                     std::sqrt(map) * of_map),
+           {},
+           {},
+           i / 4,
+           0});
+    }
+    const auto ratio = normalize_errors(fixes, errors);
+    if (!ratio) return {1, 1};
+    low += ratio->horizontal.low > 1.2 ? 1 : 0;
+    rms += ratio->horizontal.rms > 1.2 ? 1 : 0;
+  }
+  return {low / double(units), rms / double(units)};
+}
+
+TEST(NormalizeErrors, FewCorrectUnitsExceedGateByLowerLimit) {
+  for (const auto& [calibration, map] : {std::pair(0.0, 0.0), {0.5, 0.0}, {0.9, 0.0}, {0.4, 0.4}}) {
+    const auto [low, rms] = fraction_above_gate(1, calibration, map);
+    EXPECT_LE(low, 0.025) << calibration;
+    if (calibration == 0.9) EXPECT_GE(rms, 0.2) << "the rms itself, as a gate";
+  }
+}
+
+TEST(NormalizeErrors, MostUnitsWithUnderstatedNoiseExceedGateByLowerLimit) {
+  EXPECT_GE(fraction_above_gate(2, 0, 0)[0], 0.95);
+  EXPECT_GE(fraction_above_gate(4, 0.5, 0)[0], 0.8);
 }
 
 /// Four lamps round the origin at a height of 2 m.

@@ -43,7 +43,7 @@ TEST_F(UnitMetrics, RunCheckStepFailsForTooFewKnownPositions) {
 TEST_F(UnitMetrics, RunCheckStepReturnsHeightErrorOfDisplacedLamps) {
   const auto height_mm = [&] {
     const StepResult result = run_check_step(config, calibration, frames, places);
-    for (const auto& [name, value] : result.metrics) {
+    for (const auto& [name, value, interval_low] : result.metrics) {
       if (name == "check_height_mm") return value;
     }
     return -1.0;
