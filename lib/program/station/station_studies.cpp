@@ -8,6 +8,7 @@
 #include <optional>
 #include <sstream>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -236,6 +237,13 @@ void print_gauge_study(const StationRecordsOptions& options) {
   part("total (TV)", study.total);
   if (const auto categories = study.count_distinct_categories()) {
     fmt::print("distinct categories (ndc){:>21}\n", *categories);
+    const auto& [grr, fraction, ndc] =
+        std::tie(study.grr_interval, study.grr_fraction_interval, study.categories_interval);
+    constexpr double percent = 100;
+    fmt::print(
+        "95 % intervals: GRR {:.4g} to {:.4g}, {:.1f} to {:.1f} % of total; ndc {:.1f} to "
+        "{:.1f}\n",
+        grr.low, grr.high, percent * fraction.low, percent * fraction.high, ndc.low, ndc.high);
   }
   if (const auto percent_of_tolerance =
           study.precision_to_tolerance_percent(make_specification_limits(kind, gate))) {

@@ -5,12 +5,14 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <set>
 #include <stdexcept>
 
+#include "evaluation/errors/split_mix.h"
 #include "station/statistics/distributions.h"
 
 namespace vlp {
@@ -92,6 +94,46 @@ double variance_component(double larger, double smaller, double count) {
   return std::max(0.0, (larger - smaller) / count);
 }
 
+/// Sets the intervals of a study without or with a pooled interaction.
+void compute_intervals(MeasurementStudy& study) {
+  constexpr std::size_t draws = 4000, outside = draws / 40;  // 2.5 % on either side
+  const auto p = static_cast<double>(study.units), o = static_cast<double>(study.stations),
+             r = static_cast<double>(study.repeats);
+  AnovaRow error = study.error;
+  if (study.pooled) {
+    error.dof += study.interaction.dof;
+    error.sum_of_squares += study.interaction.sum_of_squares;
+  }
+  SplitMix random(1);
+  const auto draw = [&](const AnovaRow& row) {
+    constexpr double resolution = 0x1p-53;
+    const double probability = (static_cast<double>(random() >> 11) + 0.5) * resolution;
+    return row.sum_of_squares / compute_chi_square_quantile(probability, row.dof);
+  };
+  std::array<std::vector<double>, 3> figures;
+  for (std::size_t i = 0; i < draws; ++i) {
+    const double error_square = draw(error), unit_square = draw(study.unit);
+    const double interaction_square = study.pooled ? error_square : draw(study.interaction);
+    double grr_square = error_square;
+    if (study.stations > 1) {
+      grr_square =
+          (draw(study.station) + (p - 1) * interaction_square + p * (r - 1) * error_square) /
+          (p * r);
+    }
+    const double units_square = variance_component(unit_square, interaction_square, o * r);
+    figures[0].push_back(std::sqrt(grr_square));
+    figures[1].push_back(std::sqrt(grr_square / (grr_square + units_square)));
+    figures[2].push_back(MeasurementStudy::kCategoriesPerRatio *
+                         std::sqrt(units_square / grr_square));
+  }
+  const std::array intervals{&study.grr_interval, &study.grr_fraction_interval,
+                             &study.categories_interval};
+  for (std::size_t i = 0; i < figures.size(); ++i) {
+    std::ranges::sort(figures[i]);
+    *intervals[i] = {figures[i][outside - 1], figures[i][draws - outside]};
+  }
+}
+
 }  // namespace
 
 MeasurementStudy analyze_study(const std::vector<StudyValue>& values) {
@@ -123,13 +165,15 @@ MeasurementStudy analyze_study(const std::vector<StudyValue>& values) {
   study.unit_sd = std::sqrt(of_unit);
   study.grr = std::sqrt(error + of_interaction + of_station);
   study.total = std::sqrt(error + of_interaction + of_station + of_unit);
+  if (error > 0) compute_intervals(study);
   return study;
 }
 
 std::optional<int> MeasurementStudy::count_distinct_categories() const {
   if (grr <= 0) return std::nullopt;
-  constexpr double per_ratio = 1.41, max_categories = 1e6;
-  return std::max(1, static_cast<int>(std::min(max_categories, per_ratio * unit_sd / grr)));
+  constexpr double max_categories = 1e6;
+  return std::max(1,
+                  static_cast<int>(std::min(max_categories, kCategoriesPerRatio * unit_sd / grr)));
 }
 
 std::optional<double> MeasurementStudy::precision_to_tolerance_percent(

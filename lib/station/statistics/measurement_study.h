@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "evaluation/errors/bootstrap.h"
 #include "station/statistics/capability.h"
 
 namespace vlp {
@@ -48,6 +49,13 @@ struct MeasurementStudy {
   /// AIAG's GRR = sqrt(EV^2 + AV^2 + INT^2), PV (part variation), and TV (total variation). By the
   /// manual's rule 100 GRR / TV is acceptable up to 10 and unacceptable above 30.
   double grr = 0, unit_sd = 0, total = 0;
+  /// 95 % intervals of GRR, of GRR / TV and of the unrounded ndc, by generalized pivotal quantities
+  /// (Burdick, Borror and Montgomery 2005, "Design and Analysis of Gauge R&R Studies", SIAM,
+  /// section 3.5): percentiles of the figures with MS dof / chi2(dof) in place of each MS. Few
+  /// stations make them wide: with two, AV has one degree of freedom.
+  Interval grr_interval{}, grr_fraction_interval{}, categories_interval{};
+  /// Factor of the ndc in the manual.
+  static constexpr double kCategoriesPerRatio = 1.41;
   /// Returns AIAG's ndc = 1.41 PV / GRR, truncated and at least 1; the manual requires 5. Returns
   /// std::nullopt if GRR is 0.
   std::optional<int> count_distinct_categories() const;

@@ -4,11 +4,13 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <cmath>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "support/random.h"
 #include "support/rejection_message.h"
 
 namespace vlp {
@@ -25,6 +27,49 @@ std::vector<StudyValue> crossed(std::size_t stations, std::size_t repeats,
                    std::to_string(i / repeats % stations), values[i]});
   }
   return all;
+}
+
+/// Counts in how many of 300 studies the intervals of GRR, GRR / TV and ndc contain the true
+/// figures.
+std::array<int, 3> count_covered(std::size_t units, std::size_t stations, std::size_t repeats,
+                                 double station_sd, double interaction_sd) {
+  constexpr double unit_sd = 1, error_sd = 0.2;
+  const double grr =
+      std::sqrt(error_sd * error_sd + interaction_sd * interaction_sd + station_sd * station_sd);
+  Random random(2);
+  std::array<int, 3> counts{};
+  for (int i = 0; i < 300; ++i) {
+    std::vector<double> of_stations, values;
+    for (std::size_t o = 0; o < stations; ++o) of_stations.push_back(station_sd * random.normal());
+    for (std::size_t p = 0; p < units; ++p) {
+      const double unit = unit_sd * random.normal();
+      for (const double station : of_stations) {
+        const double cell = unit + station + interaction_sd * random.normal();
+        for (std::size_t r = 0; r < repeats; ++r)
+          values.push_back(cell + error_sd * random.normal());
+      }
+    }
+    const MeasurementStudy study = analyze_study(crossed(stations, repeats, values));
+    const auto holds = [](const Interval& interval, double truth) {
+      return interval.low <= truth && truth <= interval.high ? 1 : 0;
+    };
+    counts[0] += holds(study.grr_interval, grr);
+    counts[1] += holds(study.grr_fraction_interval, grr / std::hypot(grr, unit_sd));
+    counts[2] +=
+        holds(study.categories_interval, MeasurementStudy::kCategoriesPerRatio * unit_sd / grr);
+  }
+  return counts;
+}
+
+/// The expectation of 95 % of 300 studies is 285 with a standard deviation of 4.
+TEST(AnalyzeStudy, IntervalsCoverTrueFiguresAtNominalRate) {
+  for (const auto& counts : {count_covered(10, 1, 3, 0, 0), count_covered(10, 3, 3, 0.1, 0),
+                             count_covered(5, 2, 2, 0.2, 0), count_covered(10, 3, 2, 0.1, 0.3)}) {
+    for (const int count : counts) {
+      EXPECT_GE(count, 270);
+      EXPECT_LE(count, 300);
+    }
+  }
 }
 
 /// AIAG, Measurement Systems Analysis, 4th ed., tables III-B 6 (values), A 3 (analysis of variance)
