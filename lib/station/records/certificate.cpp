@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include "captures/digest.h"
 #include "captures/number_text.h"
@@ -70,6 +72,29 @@ std::string make_subject_section(const RunRecord& record, const Calibration& cal
          fmt::format("{} taken, {} used", record.images.size(), record.count_used_images())}}});
 }
 
+/// Makes the matrix of the correlations of lens, zenith, lever arm and dispersion offset; empty
+/// without a covariance. Quantities taken as exact have none.
+std::string make_correlation_table(const Calibration& calibration) {
+  if (!calibration.covariance) return "";
+  const auto& [lamps, parameters, covariance] = *calibration.covariance;
+  HtmlTable table{"Correlations of the errors", {""}, {}};
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < covariance.rows(); ++i) {
+    const std::string& name = parameters[static_cast<std::size_t>(i)];
+    if (!(covariance(i, i) > 0) || name.starts_with("lamp_")) continue;
+    rows.push_back(i);
+    std::vector<std::string> cells{name};
+    for (const Eigen::Index j : rows) {
+      cells.push_back(format_fixed_decimals(
+          covariance(i, j) / std::sqrt(covariance(i, i) * covariance(j, j)), 2));
+    }
+    table.header.push_back(name);
+    table.rows.push_back(std::move(cells));
+  }
+  for (auto& cells : table.rows) cells.resize(table.header.size());
+  return rows.empty() ? "" : make_html_table(table);
+}
+
 /// Describes the inputs that the uncertainty includes, and those that are assumed exact.
 std::string describe_inputs(const RunRecord& record, const Calibration& calibration) {
   const CheckedMetric* print = record.find_metric("board_print_px");
@@ -98,7 +123,8 @@ std::string make_results_section(const RunRecord& record, const Calibration& cal
                  "expanded uncertainty is the standard uncertainty times k = 2, for "
                  "about 95 % of a normal distribution. It includes the scatter of the "
                  "captures, the lamp map as far as lamps.yaml states its sd_m, and the lens. " +
-                 describe_inputs(record, calibration));
+                 describe_inputs(record, calibration)) +
+         make_correlation_table(calibration);
 }
 
 /// Returns "rms_px: residuals of the board's corners, ..." for readers of the certificate only.
@@ -139,9 +165,10 @@ std::string make_conformity_table(const RunRecord& record) {
          make_html_element(
              "p",
              "Decision rules: \"simple\" compares the value with the limit without its "
-             "uncertainty, so that half of the units exactly at the limit are accepted; a guard "
-             "band of k u subtracts k times the standard uncertainty from the limit (JCGM "
-             "106:2012). p is the probability that the true value is within the limit.");
+             "uncertainty, which is not stated, so that half of the units exactly at the limit are "
+             "accepted; a guard band of k u subtracts k times the standard uncertainty from the "
+             "limit (ISO 14253-1, JCGM 106:2012). p is the probability that the true value is "
+             "within the limit.");
 }
 
 /// Returns the digest of the names and digests of the images that a step used, empty without any.

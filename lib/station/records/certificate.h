@@ -47,7 +47,7 @@ void check_certifiable(const RunRecord& record);
 /// Contents, according to ISO/IEC 17025:2017 (7.8.2, 7.8.4, 7.8.6) as far as a record contains
 /// them:
 /// - unit, location, dates, number (the run), procedure,
-/// - values with U (k = 2),
+/// - values with U (k = 2), and the correlations of their errors,
 /// - for each gate the statement of conformity with its decision rule,
 /// - digests of all inputs.
 ///

@@ -115,6 +115,17 @@ TEST(MakeCertificate, ContainsMetricsGatesAndDecisionsOfRun) {
   EXPECT_THAT(page, HasSubstr("counter(pages)"));
 }
 
+TEST(MakeCertificate, ContainsCorrelationsOfCalibration) {
+  Calibration calibration = measured();
+  Matrix2 covariance;
+  covariance << 4, 1.5, 1.5, 9;
+  calibration.covariance = {{}, {"zenith_x", "zenith_y"}, covariance};
+  EXPECT_THAT(make_certificate(certified_run(), calibration),
+              HasSubstr("zenith_y</th><td>0.25</td><td>1.00</td>"));
+  calibration.covariance.reset();
+  EXPECT_THAT(make_certificate(certified_run(), calibration), Not(HasSubstr("Correlations")));
+}
+
 TEST(MakeCertificate, StatesNonconformityAndPrintOfBoard) {
   RunRecord record = certified_run();
   record.metrics[0].value = 0.4;
