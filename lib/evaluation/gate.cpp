@@ -67,8 +67,12 @@ bool CheckedMetric::has_passed_gate() const {
 
 std::optional<double> CheckedMetric::conformance_probability() const {
   if (!limit || !value || !guard_band) return std::nullopt;
-  const double room = direction == Direction::at_least ? *value - *limit : *limit - *value;
-  return std::erfc(-room / guard_band->standard_uncertainty / std::numbers::sqrt2) / 2;
+  const auto probability_below = [&](double deviation) {
+    return std::erfc(-deviation / guard_band->standard_uncertainty / std::numbers::sqrt2) / 2;
+  };
+  const double beyond_zero = probability_below(-*limit - *value);
+  return direction == Direction::at_least ? probability_below(*value - *limit) + beyond_zero
+                                          : probability_below(*limit - *value) - beyond_zero;
 }
 
 std::string describe_metrics(const std::vector<MetricKind>& known) {

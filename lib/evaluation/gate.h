@@ -54,8 +54,12 @@ struct CheckedMetric {
   /// Returns true if the gate is passed, or if there is none. A gate without a value is not passed.
   bool has_passed_gate() const;
   /// Returns the probability that the true value is within the limit, given only the measured
-  /// value: Phi((limit - value) / u), or Phi((value - limit) / u) (JCGM 106:2012, section 7).
-  /// Returns std::nullopt without a value, a limit or a guard band.
+  /// value (JCGM 106:2012, section 7). Metrics are not negative, and the measured value of an
+  /// absolute value is folded at zero:
+  ///   Phi((limit - value) / u) - Phi(-(limit + value) / u),   at most
+  ///   Phi((value - limit) / u) + Phi(-(limit + value) / u),   at least
+  /// The second term matters for values within some u of zero. Returns std::nullopt without a
+  /// value, a limit or a guard band.
   std::optional<double> conformance_probability() const;
 };
 

@@ -180,10 +180,11 @@ static void describe_rejection(Io& io, Described<Io, StationConfig> config) {
   io.optional("max_consecutive_rejections", config.max_consecutive_rejections, kCount);
 }
 
-/// Describes guard bands of gates: {k: 1.645, standard_uncertainties: {METRIC: U}}.
+/// Describes guard bands of gates: {k: 1.645, standard_uncertainties: {METRIC: U}}. The default of
+/// k is that of ISO 14253-1: at most 5 % of the units exactly at the limit are accepted.
 static void describe_bands(YamlMap& io, StationConfig& config) {
-  double k = 0;
-  io.required("k", k, Range{0, 10, "(factor)"});
+  double k = 1.645;
+  io.optional("k", k, Range{0, 10, "(factor)"});
   YamlMap uncertainties = io.require("standard_uncertainties").read_mapping();
   read_guard_bands(uncertainties, config.gates, k);
 }

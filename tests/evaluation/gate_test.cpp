@@ -85,6 +85,24 @@ TEST(CheckGates, TightensUpperAndLowerLimitsByGuardBand) {
   EXPECT_FALSE(check_gates({{"rms_px", 0.3}}, {{"rms_px", 0.1}})[0].conformance_probability());
 }
 
+/// Absolute values are folded at zero: of measured values near 0.05 with u = 0.1, 62.5 % have true
+/// values up to 0.1, and not 69 %. The standard deviation is 1 %.
+TEST(ConformanceProbability, MatchesSimulatedAbsoluteValues) {
+  constexpr double limit = 0.1, u = 0.1;
+  CheckedMetric unit = check_gates({{"rms_px", limit, GuardBand{u, 1}}}, {})[0];
+  Random random(12);
+  int near = 0, conforming = 0;
+  for (int i = 0; i < 300'000; ++i) {
+    const double truth = random.uniform(0, 1), measured = std::abs(truth + u * random.normal());
+    if (std::abs(measured - 0.05) > 0.005) continue;
+    ++near;
+    conforming += truth <= limit ? 1 : 0;
+  }
+  ASSERT_GT(near, 1000);
+  unit.value = 0.05;
+  EXPECT_NEAR(unit.conformance_probability().value(), conforming / double(near), 0.03);
+}
+
 /// Draws units of any quality and measures them with an uncertainty. Compares the number of false
 /// passes and false failures with the sum of their reported probabilities.
 TEST(ConformanceProbability, MatchesSimulatedDecisionErrors) {

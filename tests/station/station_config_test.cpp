@@ -73,7 +73,7 @@ TEST_F(ReadStationConfig, AcceptsOptionalKeysOfExampleWhenUncommented) {
 
 TEST_F(ReadStationConfig, ReadsGuardBandsAndHook) {
   change("station.yaml", "\nrecords: records.db",
-         "\nguard_bands: {k: 1.645, standard_uncertainties: {check_mean_mm: 0.02}}"
+         "\nguard_bands: {standard_uncertainties: {check_mean_mm: 0.02}}"
          "\nrecords: records.db\nhook: {command: [./label, --to, it's]}");
   const StationConfig config = read_station_config(folder / "station.yaml");
   for (const Gate& gate : config.gates) {
@@ -136,7 +136,6 @@ TEST_F(ReadStationConfig, RejectsInvalidValues) {
             "rejection.same_pose_fraction"},
            {"station.yaml", "max_consecutive_rejections: 12", "max_consecutive_rejections: 0",
             "rejection.max_consecutive_rejections"},
-           {"station.yaml", "k: 2, ", "", "guard_bands"},
            {"station.yaml", "{check_mean_mm: 0.02}", "{check_offset_mm: 0.02}",
             "guard_bands.standard_uncertainties"},
            {"station.yaml", "{check_mean_mm: 0.02}", "{}", "guard_bands.standard_uncertainties"},
