@@ -89,10 +89,11 @@ struct RotationCenter {
 /// rotates with the camera.
 struct Dispersion {
   /// Residual error of the principal point after the rotation center is applied. f * (x/z, y/z) in
-  /// the undistorted image of the level camera is too large by this offset.
+  /// the undistorted image of the level camera is too large by this offset at its center; how it
+  /// is corrected: positioning/correction.h.
   Eigen::Vector2d offset_px;
   /// Radius and center of the dispersion circle: position errors (fix minus ground truth) in the
-  /// world, before the offset is subtracted.
+  /// world, before the offset is corrected.
   double radius_m;
   Eigen::Vector2d center_m;
   int captures;
