@@ -59,8 +59,9 @@ struct CauseOptions {
 /// lamps than for the boards.
 ///
 /// With chi^2 the squares left by least squares, f = rows - 4 captures, and noise of a common,
-/// unknown factor of at least 1, the logarithm of the likelihood is
-///   -1/2 g(chi^2),   g(x) = x up to f, then f + f ln(x / f)
+/// unknown factor of at least 3, the logarithm of the likelihood is
+///   -1/2 g(chi^2 / 9),   g(x) = x up to f, then f + f ln(x / f)
+/// The lower bound covers errors of the lens, and of centers that were detected at another tilt.
 /// The causes are ranked by its increase, less (number of sizes) / 2 ln f (Schwarz, "Estimating the
 /// dimension of a model", 1978). A cause is named if the increase is above 10 and if it removes at
 /// least a quarter of chi^2 - f. The test is repeated with the named causes among u. A second cause

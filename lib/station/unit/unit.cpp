@@ -402,7 +402,9 @@ std::vector<StepCaptures> list_lamp_captures(const Unit& unit) {
     const UnitStep& state = unit.step_state(step);
     if (step == StationStep::boards || state.images.empty()) continue;
     captures.push_back({station_step_name(step), list_used_detections(state)});
-    if (step != StationStep::rotation)
+    // A table that cannot be read is the step's problem.
+    const bool is_read = state.result && state.result->has_succeeded();
+    if (step != StationStep::rotation && is_read)
       captures.back().positions = read_captures_with_truth(state.folder);
   }
   return captures;

@@ -127,7 +127,8 @@ class Unit {
 /// Returns the observations of the images with lamps, rejected ones too.
 std::vector<Observation> list_lamp_observations(const Unit& unit);
 
-/// Returns the used captures of lamps, with their known positions, of each step that has some.
+/// Returns the used captures of lamps of each step that has some, with their known positions if the
+/// step succeeded.
 std::vector<StepCaptures> list_lamp_captures(const Unit& unit);
 
 /// Returns the row time of the station's type of camera.

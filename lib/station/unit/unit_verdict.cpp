@@ -312,6 +312,13 @@ std::vector<Cause> list_lamp_faults(const Unit& unit, const std::vector<CheckedM
     for (const std::string& fault : faults) causes.push_back({fault});
   }
   if (!causes.empty() || !are_lamps_contradicted(unit, metrics)) return causes;
+  // A large tilt displaces the centers of the lamps that were detected without it.
+  const auto& rotation = unit.step_state(StationStep::rotation).result;
+  const bool is_tilted =
+      rotation && std::ranges::any_of(metrics, [&](const CheckedMetric& metric) {
+        return metric.name == "tilt_deg" && is_clearly_missed(metric, unit, rotation->metrics);
+      });
+  if (is_tilted) return causes;
   // Single captures with errors can be the effect of another cause, or the cause itself.
   constexpr double min_explained = 0.9;
   std::vector<LampCause> ranked = rank_lamp_causes(steps, lamps, *known);
@@ -395,6 +402,8 @@ std::vector<Cause> list_failure_causes(const Unit& unit) {
   append_causes(causes, describe_failures(metrics, false, [](const CheckedMetric& metric) {
                   return metric.name.starts_with("row_time_") && is_gate_missed(metric);
                 }));
+  std::set<std::string> listed;
+  std::erase_if(causes, [&](const Cause& cause) { return !listed.insert(cause.text).second; });
   return causes;
 }
 
