@@ -50,7 +50,7 @@ TEST_F(CsvTableTest, IgnoresCarriageReturnsByteOrderMarkAndEmptyLines) {
 
 TEST_F(CsvTableTest, HasNoRowsForHeaderAlone) { EXPECT_EQ(read("a,b\n").num_rows(), 0); }
 
-TEST_F(CsvTableTest, GetRequiredColumnThrowsForMissingColumn) {
+TEST_F(CsvTableTest, RequireColumnThrowsForMissingColumn) {
   const CsvTable table = read("image,lamp\nx,1\n");
   EXPECT_THAT(rejection_message([&] { (void)table.require_column("u_px"); }),
               HasSubstr("a.csv:1: u_px: this column is missing; the columns are: image, lamp"));
@@ -74,7 +74,7 @@ TEST_F(CsvTableTest, RejectsInvalidQuotesDuplicateColumnsAndEmptyFile) {
   EXPECT_THAT(refusal(""), HasSubstr("a.csv: is empty"));
 }
 
-TEST_F(CsvTableTest, GetNumberReportsLineAndColumnOfInvalidNumber) {
+TEST_F(CsvTableTest, GetCellNumberReportsLineAndColumnOfInvalidNumber) {
   for (const std::string bad : {"", "x", "1.5 m", "nan", "inf", "-inf", "1e999", "0x10", "1,5"}) {
     const CsvTable table = read("image,u_px\nok,1\nbad,\"" + bad + "\"\n");
     EXPECT_THAT(
@@ -87,7 +87,7 @@ TEST_F(CsvTableTest, GetNumberReportsLineAndColumnOfInvalidNumber) {
       HasSubstr("a.csv:2: lamp: should be a whole number, not '1.5'"));
 }
 
-TEST_F(CsvTableTest, MessagesRepeatAtMost300BytesOfFile) {
+TEST_F(CsvTableTest, MessagesQuoteAtMost300BytesOfFile) {
   const std::string text(100'000, 'x');
   const CsvTable table = read("image,u_px\n" + text + "," + text + "\n" + text + ",1\n");
   EXPECT_LT(rejection_message([&] {

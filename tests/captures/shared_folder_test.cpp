@@ -99,7 +99,7 @@ TEST_F(SharedFolderTest, ThrowsForNamesThatLeaveFolder) {
   EXPECT_EQ(TemporaryFolder::read_content(outside), "mine");
 }
 
-TEST_F(SharedFolderTest, RemoveAllFolderEntriesClearsOpenedFolderAfterItsRename) {
+TEST_F(SharedFolderTest, RemoveAllClearsOpenedFolderAfterItsRename) {
   fs::create_directories(folder / "elsewhere/kept");
   fs::create_directories(path / "sub");
   folder.file("shared/sub/file", "");
@@ -124,7 +124,7 @@ TEST_F(SharedFolderTest, ThrowsWhenOpeningPipeOrReadingFolder) {
               HasSubstr("is no regular file"));
 }
 
-TEST_F(SharedFolderTest, ReplaceFileAtomicallyKeepsModeAndOwner) {
+TEST_F(SharedFolderTest, ReplaceFileKeepsModeAndOwner) {
   const SharedFolder shared(path);
   shared.replace_file("a", "first");
   ASSERT_EQ(::chmod((path / "a").c_str(), 0640), 0);

@@ -52,7 +52,7 @@ TEST(ReadPathTable, ReadsOptionalHeights) {
             (std::vector<double>{3, 6}));
 }
 
-TEST(ReadPathTable, RejectsPathWithoutLength) {
+TEST(ReadPathTable, RejectsPathOfZeroLength) {
   const TemporaryFolder folder;
   for (const char* text : {"x_m,y_m\n", "x_m,y_m\n1,2\n", "x_m,y_m\n1,2\n1,2\n"}) {
     EXPECT_THAT(rejection_message([&] { read_path_table(folder.file("p.csv", text)); }),

@@ -55,7 +55,7 @@ TEST(ListVisiblePositions, ExcludesLampThatYawMovesOutOfImage) {
   EXPECT_EQ(list_visible_positions(map, pinhole_camera(), {{0, 0, 0}, M_PI / 2}).size(), 0);
 }
 
-TEST(ComputeFloorLimits, ReturnsPlacesOfGridRowByRow) {
+TEST(ComputeFloorLimits, ReturnsPositionsOfGridRowByRow) {
   const LampMap map = synthetic_lamps();
   const auto limits =
       compute_floor_limits(map, pinhole_camera(), {0, 0.3, -0.1, 0.1, 0.1}, 0.2, 0, kNoise);
@@ -124,7 +124,7 @@ TEST(ComputeFloorLimits, NoiseCovarianceMatchesScatterOfFixesWithFisheye) {
   }
 }
 
-TEST(ComputeFloorLimits, ReturnsNoCovariancesForPlaceWithoutVisibleLamps) {
+TEST(ComputeFloorLimits, ReturnsNoCovariancesForPositionWithoutVisibleLamps) {
   const auto limits =
       compute_floor_limits(synthetic_lamps(), pinhole_camera(), {50, 50, 0, 0, 1}, 0, 0, kNoise);
   ASSERT_EQ(limits.positions.size(), 1);

@@ -156,7 +156,7 @@ TEST(MergeGates, ReplacesLimitsAndAppendsNewGates) {
   EXPECT_EQ(gates[2].metric, "coverage");
 }
 
-TEST(CheckGates, FailsComparisonGateOnlyForEnoughClustersAndRelevantDifference) {
+TEST(CheckGates, FailsComparisonOnlyForManyClustersAndRelevantDifference) {
   Evaluation compared = evaluation();
   compared.comparison = Comparison{};
   QuantityComparison& horizontal = compared.comparison->quantities[0];

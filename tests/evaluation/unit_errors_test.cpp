@@ -181,7 +181,7 @@ TEST(CommonErrors, IsolatedErrorSourceIsUnknownIfItsVarianceIsZero) {
   EXPECT_FALSE(is_lens_error_known());
 }
 
-TEST(UnitErrors, BudgetExistsOnlyForLampsAboveCamera) {
+TEST(UnitErrors, BudgetIsNulloptForLampsBelowCamera) {
   StatedRig rig = adjusted();
   const UnitErrors unit(rig.map, rig.calibration);
   const std::vector<std::size_t> lamps{0, 1};
@@ -252,7 +252,7 @@ TEST(ComputeFixSds, ReturnsZeroForTinyNegativeVariances) {
   EXPECT_EQ(spread.yaw_rad, 0);
 }
 
-TEST(UnitErrors, IsErrorSourceKnownOrAbsentIsFalseForSourcesWithoutSd) {
+TEST(UnitErrors, IsKnownOrAbsentIsFalseForSourcesWithoutSd) {
   StatedRig rig;
   const auto stated = [&](CommonErrorSource part) {
     return UnitErrors(rig.map, rig.calibration).common_errors().is_known_or_absent(part);
@@ -291,7 +291,7 @@ TEST(UnitErrors, BudgetIsNulloptUnlessThereAre2To256Lamps) {
   }
 }
 
-TEST(UnitErrors, FindFullyVisibleLampIndicesAppliesCalibratedTilt) {
+TEST(UnitErrors, ListVisibleLampsAppliesCalibratedTilt) {
   StatedRig rig;
   rig.map = make_lamp_map({{0, 0, 1.6}, {0.1, 0, 1.6}});
   rig.camera = {{0, 0, 0}, 0};

@@ -22,9 +22,9 @@ std::string encoded_as(const std::string& ending, int width, int height) {
   return {bytes.begin(), bytes.end()};
 }
 
-class ReadImageSizeFromHeaderOfFormat : public testing::TestWithParam<const char*> {};
+class ReadHeaderSizeOfFormat : public testing::TestWithParam<const char*> {};
 
-TEST_P(ReadImageSizeFromHeaderOfFormat, ReturnsSizeOfImage) {
+TEST_P(ReadHeaderSizeOfFormat, ReturnsSizeOfImage) {
   for (const Size size : {Size{1, 1}, Size{2, 100}, Size{641, 3}, Size{300, 517}}) {
     const std::string bytes =
         encoded_as(GetParam(), static_cast<int>(size[0]), static_cast<int>(size[1]));
@@ -32,7 +32,7 @@ TEST_P(ReadImageSizeFromHeaderOfFormat, ReturnsSizeOfImage) {
   }
 }
 
-TEST_P(ReadImageSizeFromHeaderOfFormat, ReturnsSizeOrNulloptForTruncatedFile) {
+TEST_P(ReadHeaderSizeOfFormat, ReturnsSizeOrNulloptForTruncatedFile) {
   const std::string bytes = encoded_as(GetParam(), 33, 21);
   for (std::size_t length = 0; length < bytes.size(); ++length) {
     const auto size = read_header_size(std::string_view(bytes).substr(0, length));
@@ -40,7 +40,7 @@ TEST_P(ReadImageSizeFromHeaderOfFormat, ReturnsSizeOrNulloptForTruncatedFile) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, ReadImageSizeFromHeaderOfFormat,
+INSTANTIATE_TEST_SUITE_P(Formats, ReadHeaderSizeOfFormat,
                          testing::Values(".png", ".jpg", ".bmp", ".tif", ".pgm"),
                          [](const auto& ending) { return std::string(ending.param + 1); });
 

@@ -159,7 +159,7 @@ class HostileNames : public testing::Test {
   const TemporaryFolder folder;
 };
 
-TEST_F(HostileNames, EscapeTextForSingleLineReturnsOneHarmlessLine) {
+TEST_F(HostileNames, EscapeForLineReturnsOneHarmlessLine) {
   int as_they_are = 0;
   for (int i = 0; i < kNames; ++i) {
     const std::string name = random_name(random);
@@ -301,7 +301,7 @@ TEST_F(HostileNames, UnitReportContainsNoHtmlTagsFromNames) {
   }
 }
 
-TEST_F(HostileNames, ExportSelectedRunsToFileWritesExactlyOneRowPerRun) {
+TEST_F(HostileNames, WriteRunsWritesExactlyOneRowPerRun) {
   constexpr int every = 10;
   std::vector<RunRecord> runs;
   runs.reserve(kNames / every);

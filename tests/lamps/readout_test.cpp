@@ -45,7 +45,7 @@ TEST(EstimateReadout, StopsReadingAfterFirstConclusiveImages) {
   EXPECT_LE(asked, 4);
 }
 
-TEST(ReadoutDirectionEvidence, ReadoutReturnsNulloptForWeakOrContradictoryEvidence) {
+TEST(ReadoutDirectionEvidence, ReadoutDirectionIsNulloptForWeakOrContradictoryEvidence) {
   EXPECT_FALSE((ReadoutDirectionEvidence{0.9, 0}).readout_direction());
   EXPECT_FALSE((ReadoutDirectionEvidence{3, 2}).readout_direction());
   EXPECT_EQ((ReadoutDirectionEvidence{3, 0.5}).readout_direction(), Readout::rows);

@@ -60,7 +60,7 @@ class VlpEvaluate : public testing::Test {
   }
 };
 
-TEST_F(VlpEvaluate, PrintsHandComputedMetrics) {
+TEST_F(VlpEvaluate, PrintsMetricsComputedByHand) {
   const auto result = with_truth();
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output,

@@ -175,7 +175,7 @@ TEST(BashCompletion, CompletesChoicesCommandsAndFiles) {
 }
 
 /// An option that was renamed would be recorded.
-TEST(ListOmittedOptions, ReturnsOnlyExistingOptions) {
+TEST(ListOmittedOptions, ReturnsOnlyOptionsThatExistInHelp) {
   std::vector<std::string> options;
   for (const char* program : {"vlp-adjust", "vlp-convert", "vlp-dispersion", "vlp-evaluate",
                               "vlp-intrinsics", "vlp-rotation", "vlp-train"}) {

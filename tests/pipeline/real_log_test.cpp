@@ -194,7 +194,7 @@ double path_over_fixes(const std::vector<Eigen::Vector2d>& driven,
 /// the lens estimated from the log, the lengths agree within 2 %, and the estimated pixels are
 /// square without a constraint. The residuals then exceed the rounding to whole pixels (0.41 px,
 /// both axes) only slightly, and the distances match the reported uncertainty of the fixes.
-TEST_F(RealLog, FixesMatchPathLengthOnlyWithLensAdjustedToLog) {
+TEST_F(RealLog, PathLengthOfFixesIsTrueOnlyWithLensEstimatedFromLog) {
   ASSERT_EQ(level().exit_code, 0);
   keep_every_third_frame();
   const auto adjusted = [&](const std::string& options) {

@@ -46,7 +46,7 @@ class VlpIntrinsicsSquareBoards : public VlpIntrinsics {
   const std::string boards = rig + "/boards", board = rig + "/board.yaml";
 };
 
-TEST_F(VlpIntrinsicsSquareBoards, EstimatesLensFromChessboardUnlessSizeCountsCorners) {
+TEST_F(VlpIntrinsicsSquareBoards, EstimatesLensFromChessboardAndRejectsSizeInCorners) {
   render("{kind: chessboard, cols: 10, rows: 7, square_size_m: 0.015}",
          "{count: 24, distance_m: [0.15, 0.25], tilt_deg: 45, roll_deg: 180, field_coverage: 0.7}");
   const std::string cache = " --cache " + (folder / "cache").string();

@@ -91,7 +91,7 @@ TEST_F(PositionerMovingOrTiltedCamera, ReturnsNotFiniteForNanOrInvalidSdOfSensor
   }
 }
 
-TEST_F(PositionerMovingOrTiltedCamera, EarlierFramesHaveToBeEarlierAndDistinct) {
+TEST_F(PositionerMovingOrTiltedCamera, ReturnsNotFiniteForEarlierFramesOfLaterOrEqualTime) {
   const auto detections = seen();
   const double infinite_s = std::numeric_limits<double>::infinity();
   const double nan_s = std::numeric_limits<double>::quiet_NaN();
@@ -289,7 +289,7 @@ TEST_F(PositionerMovingOrTiltedCamera, RejectsOutlierOnlyWhenFarAboveUnderstated
 }
 
 /// Three lamps determine position and tilt exactly: without any of four the others agree.
-TEST_F(PositionerMovingOrTiltedCamera, KeepsMovedLampOfFourWithFreeTilt) {
+TEST_F(PositionerMovingOrTiltedCamera, RejectsNoneOfFourLampsWithFreeTiltIfOneIsMoved) {
   stand();
   for (std::size_t moved = 0; moved < 4; ++moved) {
     auto detections = seen_from(rig, kBodyNoise_px);

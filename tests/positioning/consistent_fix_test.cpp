@@ -37,7 +37,7 @@ class NormalizedErrors {
 };
 
 /// Fixes that assume a level camera at rest.
-class AssumedLevelAtRest : public testing::TestWithParam<std::size_t> {
+class PositionerAssumingLevelAtRest : public testing::TestWithParam<std::size_t> {
  protected:
   static constexpr double kSigma_px = 0.02;
 
@@ -64,11 +64,11 @@ class AssumedLevelAtRest : public testing::TestWithParam<std::size_t> {
   }
 };
 
-TEST_P(AssumedLevelAtRest, CovarianceMatchesErrorsWithoutMotionOrTilt) {
+TEST_P(PositionerAssumingLevelAtRest, CovarianceMatchesErrorsWithoutMotionOrTilt) {
   EXPECT_NEAR(locate(0, 0).joint(), 1, 0.2);
 }
 
-TEST_P(AssumedLevelAtRest, CovarianceCoversErrorsOfMovingCamera) {
+TEST_P(PositionerAssumingLevelAtRest, CovarianceCoversErrorsOfMovingCamera) {
   for (const double speed_m_per_s : {0.5, 2.0}) {
     const double joint = locate(speed_m_per_s, 0).joint();
     EXPECT_LT(joint, 1.2) << speed_m_per_s;
@@ -76,7 +76,7 @@ TEST_P(AssumedLevelAtRest, CovarianceCoversErrorsOfMovingCamera) {
   }
 }
 
-TEST_P(AssumedLevelAtRest, CovarianceCoversErrorsOfTiltedCamera) {
+TEST_P(PositionerAssumingLevelAtRest, CovarianceCoversErrorsOfTiltedCamera) {
   for (const double tilt_deg : {0.2, 1.0, 5.0}) {
     const double joint = locate(0, rad_from_deg(tilt_deg)).joint();
     EXPECT_LT(joint, 1.2) << tilt_deg;
@@ -85,11 +85,11 @@ TEST_P(AssumedLevelAtRest, CovarianceCoversErrorsOfTiltedCamera) {
 }
 
 /// Frames of which the residuals do not contradict the noise keep the stated covariance.
-TEST_P(AssumedLevelAtRest, CovarianceCoversErrorsWhenNoiseIsTenTimesTheGivenOne) {
+TEST_P(PositionerAssumingLevelAtRest, CovarianceCoversErrorsWhenNoiseIsTenTimesTheGivenOne) {
   EXPECT_LT(locate(0, 0, 10 * kSigma_px).joint(), GetParam() == 4 ? 20 : 2);
 }
 
-INSTANTIATE_TEST_SUITE_P(Lamps, AssumedLevelAtRest, testing::Values(4, 8));
+INSTANTIATE_TEST_SUITE_P(Lamps, PositionerAssumingLevelAtRest, testing::Values(4, 8));
 
 class PositionerPriors : public testing::Test {
  protected:

@@ -18,7 +18,7 @@ using testing::IsEmpty;
 
 /// Camera tilted by 20 degrees. Errors of lamp centers: 40 px per radian of the angle error of the
 /// detection plane, or 2 px for ellipses in place of discs.
-class RepeatedDetectionInTiltedImage : public testing::Test {
+class LocateWithRepeatedDetection : public testing::Test {
  protected:
   void SetUp() override { rig_.body.motion.inclination = tilt_; }
 
@@ -66,7 +66,7 @@ class RepeatedDetectionInTiltedImage : public testing::Test {
   BodyRig rig_{synthetic_lamps(), rolling_calibration(), {}, {}};
 };
 
-TEST_F(RepeatedDetectionInTiltedImage, ErrorIsBelow100MicrometersForUnknownTilt) {
+TEST_F(LocateWithRepeatedDetection, ErrorIsBelow100MicrometersForUnknownTilt) {
   const ImageFix found = locate(unknown_tilt());
   EXPECT_LT(compute_error_m(found.fix), 1e-4);
   ASSERT_GE(planes.size(), 3U);
@@ -76,7 +76,7 @@ TEST_F(RepeatedDetectionInTiltedImage, ErrorIsBelow100MicrometersForUnknownTilt)
   EXPECT_EQ(found.repetition, planes.size());
 }
 
-TEST_F(RepeatedDetectionInTiltedImage, IsNotRepeatedOnlyIfInclinationIsExact) {
+TEST_F(LocateWithRepeatedDetection, RepeatsDetectionUnlessInclinationIsExact) {
   Sensors sensors;
   sensors.inclination = Inclination{rad_from_deg(16), rad_from_deg(-12)};
   EXPECT_LT(compute_error_m(locate(sensors).fix), 1e-4);
@@ -87,7 +87,7 @@ TEST_F(RepeatedDetectionInTiltedImage, IsNotRepeatedOnlyIfInclinationIsExact) {
   EXPECT_FALSE(planes.empty());
 }
 
-TEST_F(RepeatedDetectionInTiltedImage, IsRepeatedWithEllipsesOnlyForTiltSdAboveThreeDegrees) {
+TEST_F(LocateWithRepeatedDetection, FitsEllipsesFirstOnlyForTiltSdAboveThreeDegrees) {
   for (const double sd_rad : {0.045, 0.055}) {
     planes.clear();
     Sensors sensors;
@@ -99,7 +99,7 @@ TEST_F(RepeatedDetectionInTiltedImage, IsRepeatedWithEllipsesOnlyForTiltSdAboveT
   }
 }
 
-TEST_F(RepeatedDetectionInTiltedImage, ContinuesFromFirstFixIfEllipsesHaveNone) {
+TEST_F(LocateWithRepeatedDetection, ContinuesFromFirstFixIfEllipsesYieldNoFix) {
   have_ellipses_one_lamp = true;
   EXPECT_LT(compute_error_m(locate(unknown_tilt()).fix), 1e-3);
   ASSERT_GE(planes.size(), 3U);
@@ -107,7 +107,7 @@ TEST_F(RepeatedDetectionInTiltedImage, ContinuesFromFirstFixIfEllipsesHaveNone) 
   EXPECT_GE(planes[1], 0);
 }
 
-TEST_F(RepeatedDetectionInTiltedImage, KeepsDetectionsWithMoreLampsWithoutFix) {
+TEST_F(LocateWithRepeatedDetection, ReturnsDetectionsOfMostLampsIfThereIsNoFix) {
   have_only_ellipses_two_lamps = true;
   const ImageFix found = locate(unknown_tilt());
   EXPECT_THAT(planes, ElementsAre(-1));

@@ -46,14 +46,14 @@ TEST(RenderReportHtml, FailsGateWithoutValue) {
                               "<td>at most\u00a01\u00a0px</td><td>NOT\u00a0MET</td>"));
 }
 
-TEST(RenderReportHtml, HasCautionInVerdictBox) {
+TEST(RenderReportHtml, ShowsCautionInVerdictBox) {
   Report report{"unit 7", {{"mean_mm", "mm", 0.5, 1, Direction::at_most}}, {}, {}, {}, {}, {}};
   report.caution = "9 of 10 <captures>";
   EXPECT_THAT(render_report_html(report),
               HasSubstr("(1 gate).<p>9 of 10 &lt;captures&gt;</p>\n</div>"));
 }
 
-TEST(RenderReportHtml, HasNoVerdictWithoutGates) {
+TEST(RenderReportHtml, ShowsNoVerdictWithoutGates) {
   const std::string html = render_report_html({"unit 7", {}, {}, {}, {}, {}, {}});
   EXPECT_THAT(html, HasSubstr("NO VERDICT"));
   EXPECT_THAT(html, Not(HasSubstr("PASS</strong>")));

@@ -154,7 +154,7 @@ TEST(WriteCalibration, RoundTripsCalibrationWithoutEachOptionalPart) {
   }
 }
 
-TEST(ReadCalibration, RefusesCovarianceOfMissingRotationCenter) {
+TEST(ReadCalibration, RejectsCovarianceOfMissingRotationCenter) {
   Calibration calibration = sample_calibration();
   calibration.rotation_center.reset();
   const TemporaryFolder folder;

@@ -219,7 +219,7 @@ TEST_F(RunAdjustStep, WarnsOfLensThatContradictsCaptures) {
 
 /// A camera that drives at 1 m/s and whose velocity is known. The lamps seem displaced by up to
 /// 20 mm in its images.
-TEST(RunJointAdjustmentStepOfDrive, FindsNoMovedLampInExactCapturesOfMovingCamera) {
+TEST(RunAdjustStepOfDrive, FindsNoMovedLampInExactCapturesOfMovingCamera) {
   BodyRig rig{synthetic_lamps(), rolling_calibration(), {}, {}};
   AdjustStepInput input{{}, rig.map, "lamps.yaml", rig.calibration, "camera.yaml", 0.002, {}};
   AdjustSet set{"drive", {}, {}};

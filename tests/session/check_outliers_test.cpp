@@ -69,8 +69,8 @@ TEST(DescribeResidualOutliers, NamesCapturesOnlyWhenAtLeastTwoAreOutliers) {
 }
 
 /// Positions equal to the fixes, in the table of a check.
-struct PlaceFault : ExampleRig {
-  PlaceFault() {
+struct KnownPositionFaults : ExampleRig {
+  KnownPositionFaults() {
     const Positioner positioner(map, calibration);
     for (const Frame& frame : frames) {
       const Fix fix = positioner.compute_position_fix(frame.detections);
@@ -89,7 +89,7 @@ struct PlaceFault : ExampleRig {
   CapturesTable places;
 };
 
-TEST_F(PlaceFault, DescribeWrongPositionsNamesSeveralWrongCaptures) {
+TEST_F(KnownPositionFaults, DescribeWrongPositionsNamesSeveralWrongCaptures) {
   ASSERT_GT(frames.size(), 12U);
   CapturesTable wrong = places;
   for (std::size_t i = 0; i < 5; ++i) wrong.at(frames[i].image).y_m.value() += 0.052;
@@ -102,7 +102,7 @@ TEST_F(PlaceFault, DescribeWrongPositionsNamesSeveralWrongCaptures) {
 }
 
 /// If half or more are wrong, the others are not reliable.
-TEST_F(PlaceFault, DescribeWrongPositionsIsEmptyWhenMostAreWrong) {
+TEST_F(KnownPositionFaults, DescribeWrongPositionsIsEmptyWhenMostAreWrong) {
   CapturesTable wrong = places;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     if (i % 4 != 0) wrong.at(frames[i].image).y_m.value() += 0.02;
@@ -111,7 +111,7 @@ TEST_F(PlaceFault, DescribeWrongPositionsIsEmptyWhenMostAreWrong) {
 }
 
 /// The zenith of another camera displaces all fixes by one offset in the frame of the camera.
-TEST_F(PlaceFault, FindCommonOffsetDistinguishesCameraFromRoomFrame) {
+TEST_F(KnownPositionFaults, FindCommonOffsetDistinguishesCameraFromRoomFrame) {
   EXPECT_FALSE(find_common_offset(make_input(places)));
   const Positioner positioner(map, calibration);
   CapturesTable rotating = places, constant = places, scattered = places;

@@ -163,7 +163,7 @@ TEST(CheckKnownPositions, FailsIfFewerThanRequiredAreKnown) {
   EXPECT_EQ(check_known_positions(0, 0, 1).failure, StepFailure::wrong_place);
 }
 
-TEST(RunDispersionStep, FailureNamesStatusOfFirstFix) {
+TEST(RunDispersionStep, FailureMessageNamesStatusOfFirstFix) {
   const SyntheticRig rig = make_rig_with_tilted_camera();
   KnownPositions known = take_captures_at_origin(rig, {0, 0});
   for (ReferencePointCapture& capture : known.captures) capture.detections.resize(1);
@@ -174,7 +174,7 @@ TEST(RunDispersionStep, FailureNamesStatusOfFirstFix) {
       HasSubstr("; the first: " + std::string(describe_fix_status(FixStatus::too_few_lamps))));
 }
 
-TEST(RunDispersionStep, HasNoCovarianceForEnclosingCircleOfPositionsOfAxis) {
+TEST(RunDispersionStep, EnclosingCircleOfAxisPositionsHasNoCovariance) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   rig.calibration.rotation_center->lever_arm_m = Eigen::Vector2d(0, 0);
   KnownPositions known = take_captures_at_origin(rig, {0.1, 0});
@@ -191,7 +191,7 @@ TEST(RunDispersionStep, HasNoCovarianceForEnclosingCircleOfPositionsOfAxis) {
   }
 }
 
-TEST(RunDispersionStep, OffsetHasErrorsOfLeverArmForPositionsOfAxisOnly) {
+TEST(RunDispersionStep, OffsetIncludesLeverArmErrorsForAxisPositionsOnly) {
   for (const MeasuredPoint point : {MeasuredPoint::camera, MeasuredPoint::axis}) {
     SyntheticRig rig = make_rig_with_tilted_camera();
     KnownPositions known = take_captures_at_origin(rig, {0, 0});
@@ -223,7 +223,7 @@ TEST(RunDispersionStep, OffsetHasErrorsOfLeverArmForPositionsOfAxisOnly) {
   }
 }
 
-TEST(RunDispersionStep, DoesNotReportMovedLampForSingleYaw) {
+TEST(RunDispersionStep, FailureMessageDoesNotBlameMovedLampForSingleYaw) {
   SyntheticRig rig = make_rig_with_tilted_camera();
   const LampMap map = rig.map;
   rig.map.lamps[1].position_m.x() += 0.01;

@@ -26,7 +26,7 @@ struct Case {
 /// Prints a case as its name, in place of its bytes.
 void PrintTo(const Case& one, std::ostream* out) { *out << one.name; }
 
-class LocateCameraFromNoisyDetections : public testing::TestWithParam<Case> {
+class LocateFromNoisyDetections : public testing::TestWithParam<Case> {
  protected:
   /// Draws three captures, under lamps at drawn distances from the map.
   LocateInput draw_captures() {
@@ -62,7 +62,7 @@ class LocateCameraFromNoisyDetections : public testing::TestWithParam<Case> {
   std::vector<Pose> truth;
 };
 
-TEST_P(LocateCameraFromNoisyDetections, ReportedSdsMatchErrorsOfFixes) {
+TEST_P(LocateFromNoisyDetections, ReportedSdsMatchErrorsOfFixes) {
   constexpr int draws = 500;
   Eigen::Vector4d squares = Eigen::Vector4d::Zero();
   int fixes = 0, within = 0;
@@ -136,7 +136,7 @@ TEST(LocateFromDetections, NoiseSdExcludesErrorsOfMap) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Rooms, LocateCameraFromNoisyDetections,
+INSTANTIATE_TEST_SUITE_P(Rooms, LocateFromNoisyDetections,
                          testing::Values(Case{"Stated", 0, Noise::stated},
                                          Case{"NotStated", 0, Noise::not_stated},
                                          Case{"TooSmall", 0, Noise::too_small},

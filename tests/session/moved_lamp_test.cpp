@@ -114,7 +114,7 @@ TEST_F(MovedLamp, NoStepWarnsOfLampWhenMapIsCorrect) {
   }
 }
 
-TEST_F(MovedLamp, AdjustmentWarnsOfSetThatIsNoRotationInPlace) {
+TEST_F(MovedLamp, AdjustmentWarnsOfSetThatDoesNotRotateInPlace) {
   take_captures({0, 0});
   const AdjustStepResult result =
       run_adjust_step({{{"rotation", rotation.frames, {}, true}, {"check", check, {}, true}},

@@ -143,7 +143,7 @@ TEST(RunRotationStep, FailsIfCapturesAreNoRotationInPlace) {
   EXPECT_FALSE(result.calibration.rotation_center);
 }
 
-TEST(RunRotationStep, DoesNotReportMovedLampForSmallArc) {
+TEST(RunRotationStep, SmallArcFailsWithMovedLampOnlyAsWarning) {
   RotatingCamera camera;
   camera.survey.truth.map.lamps[1].position_m.x() += 0.03;
   camera.rotate(0, 36);

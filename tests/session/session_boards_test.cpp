@@ -16,9 +16,9 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class RunCalibrationSessionWithBoards : public RenderedSession {
+class RunSessionWithBoards : public RenderedSession {
  protected:
-  RunCalibrationSessionWithBoards() {
+  RunSessionWithBoards() {
     add_boards_in_place_of_camera();
     options.camera_id = "unit-8";
     options.lens_model = LensModel::opencv4;
@@ -40,7 +40,7 @@ std::vector<std::string> list_gate_names(const std::vector<CheckedMetric>& gates
   return names;
 }
 
-TEST_F(RunCalibrationSessionWithBoards, EstimatesLensWithNameModelAndRowTimeOfOptions) {
+TEST_F(RunSessionWithBoards, EstimatesLensWithNameModelAndRowTimeOfOptions) {
   options.frontend.readout = Readout::rows;
   options.frontend.max_blur_fraction = 0.004;
   options.frontend.max_white_fraction = 0.5;
@@ -72,7 +72,7 @@ TEST_F(RunCalibrationSessionWithBoards, EstimatesLensWithNameModelAndRowTimeOfOp
   EXPECT_TRUE(find_metric_value(find_step(result, "rotation").result.metrics, "row_time_us"));
 }
 
-TEST_F(RunCalibrationSessionWithBoards, ChecksDefaultGatesOfLens) {
+TEST_F(RunSessionWithBoards, ChecksDefaultGatesOfLens) {
   options.frontend.row_time_s.reset();
   options.report = true;
   const SessionResult result = run();
@@ -113,7 +113,7 @@ TEST_F(RunCalibrationSessionWithBoards, ChecksDefaultGatesOfLens) {
   }
 }
 
-TEST_F(RunCalibrationSessionWithBoards, NotesSelectedLensModel) {
+TEST_F(RunSessionWithBoards, NotesSelectedLensModel) {
   options.choose_lens_model = true;
   options.frontend.readout = Readout::columns;
   const SessionResult result = run();

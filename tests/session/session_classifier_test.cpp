@@ -21,7 +21,7 @@ using testing::HasSubstr;
 using testing::Not;
 
 /// Session with classifier.yaml, without row time, and without frequencies in lamps.yaml.
-class RunCalibrationSessionWithClassifier : public RenderedSession {
+class RunSessionWithClassifier : public RenderedSession {
  protected:
   void SetUp() override {
     write_camera(std::nullopt);
@@ -43,7 +43,7 @@ class RunCalibrationSessionWithClassifier : public RenderedSession {
   }
 };
 
-TEST_F(RunCalibrationSessionWithClassifier, RequiresNeitherRowTimeNorFrequencies) {
+TEST_F(RunSessionWithClassifier, RequiresNeitherRowTimeNorFrequencies) {
   options.report = true;
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
@@ -60,7 +60,7 @@ TEST_F(RunCalibrationSessionWithClassifier, RequiresNeitherRowTimeNorFrequencies
   EXPECT_LT(*mean_mm, 0.2);
 }
 
-TEST_F(RunCalibrationSessionWithClassifier, RunsStepsWithLampsAgainIfClassifierChanges) {
+TEST_F(RunSessionWithClassifier, RunsStepsWithLampsAgainIfClassifierChanges) {
   run();
   write_session_file("classifier.yaml",
                      TemporaryFolder::read_content(session_file("classifier.yaml")) + "# again\n");

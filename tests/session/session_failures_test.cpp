@@ -207,7 +207,7 @@ TEST_F(RunSession, RemovesPathOfSessionOnlyAtBeginningOfFileName) {
   EXPECT_THAT(run().reason, testing::EndsWith("should be a finite number, not 'x" + path + "'"));
 }
 
-TEST_F(RunSession, IncompleteSessionHasNoResultAndNoOutputs) {
+TEST_F(RunSession, IncompleteSessionIsInvalidAndHasNoOutputs) {
   run();
   fs::remove(session_file("lamps.yaml"));
   const SessionResult result = run();

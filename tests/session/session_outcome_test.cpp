@@ -59,7 +59,7 @@ TEST(MakeStepGates, LimitsYawErrorsAboveFiveDegrees) {
   EXPECT_EQ(found[0].metric, "normalized_yaw_error_rms");
 }
 
-TEST_F(RunSession, StrictFailsForEachWarning) {
+TEST_F(RunSession, StrictOptionFailsSessionWithWarning) {
   options.camera_id = "another";  // than that of camera.yaml, which warns
   EXPECT_EQ(run().verdict, Verdict::pass);
   options.strict = true;
@@ -84,7 +84,7 @@ TEST_F(RunSession, ChecksGatesInOrderOfSteps) {
   EXPECT_THAT(find_step(result, "check").result.gates, IsEmpty());
 }
 
-TEST_F(RunSession, FailedGatesAreTheReasonOfVerdict) {
+TEST_F(RunSession, ReasonOfVerdictListsFailedGates) {
   options.report = true;
   write_session_file("gates.yaml", format_gates("mean_mm: 1.0e-6, tilt_deg: 0.5, rotation_px: 1"));
   const SessionResult result = run();
@@ -124,7 +124,7 @@ TEST_F(RunSession, GatesFileOfOptionsAppliesOnlyToSessionWithoutGates) {
   EXPECT_THAT(list_gates(run().gates), ElementsAre("rotation_px"));
 }
 
-TEST_F(RunSession, GatesOfMissingStepsFail) {
+TEST_F(RunSession, FailsGatesOfMissingSteps) {
   write_session_file("gates.yaml", format_gates("views: 6, dispersion_mm: 1, mean_mm: 1"));
   fs::remove_all(session_file("dispersion"));
   fs::remove_all(session_file("check"));
@@ -146,7 +146,7 @@ TEST_F(RunSession, DoesNotCheckGatesOfFailedStep) {
   EXPECT_THAT(result.reason, StartsWith("rotation: "));
 }
 
-TEST_F(RunSession, EvaluateStatesWhyThereIsNoReport) {
+TEST_F(RunSession, NotesWhyThereIsNoReport) {
   options.report = true;
   fs::remove(session_file("check/truth.csv"));
   const SessionResult without_places = run();
@@ -208,7 +208,7 @@ TEST_F(RunSession, IgnoresReadoutOptionIfRowTimeIsEstimated) {
   EXPECT_EQ(result.calibration->camera.readout, Readout::rows);
 }
 
-TEST_F(RunSession, StatesRmsOfGivenCameraIfItHasViews) {
+TEST_F(RunSession, ReportsRmsOfGivenCameraIfItHasViews) {
   Calibration camera = read_calibration(session_file("camera.yaml"));
   camera.intrinsics_report = IntrinsicsReport{40, 4000, 0, 0.125, {}, {}};
   write_calibration(session_file("camera.yaml"), camera);
@@ -258,7 +258,7 @@ TEST_F(RunSession, DoesNotWarnOfPositionErrorOfFixFromTwoLamps) {
   EXPECT_THAT(find_step(result, "evaluate").result.warnings, IsEmpty());
 }
 
-TEST_F(RunSession, StatesLampOffsetsOfCheckOnly) {
+TEST_F(RunSession, ReportsLampOffsetsOfCheckStepOnly) {
   options.report = true;
   const SessionResult result = run();
   const auto& offsets = find_step(result, "check").result.lamp_offsets;

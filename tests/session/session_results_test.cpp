@@ -57,7 +57,7 @@ TEST_F(SessionResultsTest, KeepsOutputsOfLastRunUntilThoseOfThisRunArePublished)
   EXPECT_FALSE(fs::exists(results / "steps/new"));
 }
 
-TEST_F(SessionResultsTest, WriteRefusalJunitXmlReplacesThatOfAnySession) {
+TEST_F(SessionResultsTest, WriteRefusalJunitReplacesFileOfAnySession) {
   { const SessionResults taken(results, session); }
   const std::string owner = TemporaryFolder::read_content(results / "steps/session");
   for (const fs::path& other : {folder / "another", session, fs::path()}) {
@@ -124,7 +124,7 @@ TEST_F(SessionResultsTest, RemovesOnlyKnownOutputNamesOfForgedOutputList) {
   }
 }
 
-TEST_F(SessionResultsTest, KeepsListingOutputsThatCouldNotBeRemoved) {
+TEST_F(SessionResultsTest, KeepsUnremovableOutputsInOutputList) {
   const std::vector<StepOutputs> with_picture{{"lens", {"lens.yaml", "lens.svg"}}};
   {
     SessionResults before(results, session);

@@ -61,7 +61,7 @@ TEST_F(RunSession, EstimatesTiltLeverArmAndDispersionOfRenderedCamera) {
   EXPECT_FALSE(read_calibration(results_file("rotated.yaml")).dispersion);
 }
 
-TEST_F(RunSession, ReportAddsPlotsDrivesAndReportHtml) {
+TEST_F(RunSession, ReportOptionAddsPlotsDrivesAndReportHtml) {
   options.report = true;
   const SessionResult result = run();
   EXPECT_EQ(result.verdict, Verdict::pass) << result.reason;
@@ -186,7 +186,7 @@ TEST_F(RunSession, RunsStepsAgainIfProgramOrOptionsChange) {
               ElementsAre("rotation", "dispersion", "line-x", "evaluate"));
 }
 
-TEST_F(RunSession, RunsStepsOfRoomThatIsSelected) {
+TEST_F(RunSession, RunsStepsWithLampsOfSelectedRoom) {
   std::string lamps = TemporaryFolder::read_content(session_file("lamps.yaml"));
   for (auto at = lamps.find("duty: 0.5"); at != std::string::npos;
        at = lamps.find("duty: 0.5", at + 20)) {
@@ -273,7 +273,7 @@ TEST_F(RunSession, EstimatesRowTimeIfCameraHasNone) {
   EXPECT_THAT(list_executed_steps(run()), ElementsAre("row-time", "rotation"));
 }
 
-TEST_F(RunSession, StatesRowTimeInRotationOnceEstimateIsGiven) {
+TEST_F(RunSession, RotationStepReportsRowTimeOnceCameraHasOne) {
   write_camera(std::nullopt);
   run();
   fs::copy(results_file("camera.yaml"), session_file("camera.yaml"),

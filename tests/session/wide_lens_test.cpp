@@ -37,7 +37,7 @@ LensInput make_wide_set(double reach_deg, LensModel model) {
   return input;
 }
 
-TEST(RunLensCalibrationStepWithWideLens, ProposesFisheyeWhenBoardIsBeyondRaysOfModel) {
+TEST(RunLensStepWithWideLens, ProposesFisheyeWhenBoardIsBeyondRaysOfModel) {
   const LensResult result = run_lens_step(make_wide_set(180, LensModel::opencv8), {});
   EXPECT_EQ(result.failure, StepFailure::undetermined);
   EXPECT_THAT(result.message, AllOf(HasSubstr("30 views with the board: it is visible up to 10"),
@@ -49,7 +49,7 @@ TEST(RunLensCalibrationStepWithWideLens, ProposesFisheyeWhenBoardIsBeyondRaysOfM
 
 /// Up to 87 degrees: the errors of a lens that passes match the reported ones in the calibrated
 /// region.
-TEST(RunLensCalibrationStepWithWideLens, LensErrorsAreWithinThreeSigmasIfGatesPass) {
+TEST(RunLensStepWithWideLens, LensErrorsAreWithinThreeSigmasIfGatesPass) {
   constexpr double sigmas = 3;
   int compared = 0;
   for (const double reach_deg : {60, 75, 87}) {

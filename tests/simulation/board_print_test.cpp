@@ -27,7 +27,7 @@ struct RayToPoint {
   Eigen::Vector3d origin_m, direction;
 };
 
-TEST(BoardPattern, RayMeetsWarpedBoardWhereItWasAimed) {
+TEST(BoardPattern, RayIntersectsWarpedBoardAtTargetPoint) {
   const SceneBoard board = make_warped_board();
   const BoardPattern pattern(board);
   const BoardWarp warp(board);
@@ -44,7 +44,7 @@ TEST(BoardPattern, RayMeetsWarpedBoardWhereItWasAimed) {
   }
 }
 
-TEST(BoardPattern, RayAwayFromBoardMeetsNothing) {
+TEST(BoardPattern, RayAwayFromBoardHasNoIntersection) {
   const BoardPattern pattern(make_warped_board());
   EXPECT_FALSE(pattern.intersect({0.1, 0.1, -0.5}, {0.1, 0.05, -1}).allFinite());
 }

@@ -113,7 +113,7 @@ TEST_F(FrameRendererDownlight, HaloAndRecessFlickerInPhaseWithLamp) {
   EXPECT_TRUE(dark && lit);
 }
 
-TEST_F(FrameRendererDownlight, ChipsAddGaussianBrightnessAtGivenPitchInsideRim) {
+TEST_F(FrameRendererDownlight, LedChipsAddGaussianBrightnessAtGivenPitchInsideRim) {
   const Eigen::Vector3d eye_m(0.0015, 0.0015, 0.1);  // the lamp is at (399, 299)
   const cv::Mat1f even = rendered(eye_m);
   glow().chips = Chips{0.4, 0.03, 0.015};

@@ -145,7 +145,7 @@ TEST_F(FrameRendererForeignLight, SlantedBlindRendersBarsAlongFirstEdge) {
   }
 }
 
-TEST_F(FrameRendererForeignLight, SignRendersSeededRandomStrokesOfItsRadiance) {
+TEST_F(FrameRendererForeignLight, SignRendersRandomStrokesOfItsRadianceBySeed) {
   scene_.ambient_e_per_s = 1e6;
   scene_.clutter.signs = {{{{-0.3, -0.15, 1.6}, {0.6, 0, 0}, {0, 0.3, 0}, 6e7}, 2, 5, {}}};
   draw_random_parts(scene_);

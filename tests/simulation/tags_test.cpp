@@ -108,7 +108,7 @@ TEST(MakeTagPattern, ThrowsForUnknownIdOrBorderWidth) {
 }
 
 /// The last id of each family is readable as a board and has a pattern; the next one is neither.
-TEST(ReadBoard, KnowsNumberOfTagsOfEachFamily) {
+TEST(ReadBoard, AcceptsAsManyTagsAsEachFamilyHas) {
   const TemporaryFolder folder;
   for (const auto& [family, tags] : {std::pair("tag36h11", 587),
                                      {"tag25h9", 35},

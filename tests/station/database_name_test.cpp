@@ -19,8 +19,8 @@ using testing::Not;
 using testing::StartsWith;
 
 /// Defaults of libpq for missing parts of a connection string.
-struct DatabaseIdentity : testing::Test {
-  DatabaseIdentity() {
+struct DeriveIdentity : testing::Test {
+  DeriveIdentity() {
     for (const char* name : {"PGHOST", "PGHOSTADDR", "PGPORT", "PGDATABASE", "PGSERVICE"}) {
       ::unsetenv(name);
     }
@@ -29,7 +29,7 @@ struct DatabaseIdentity : testing::Test {
     EXPECT_EQ(::gethostname(name.data(), name.size() - 1), 0);
     here = std::string(name.data()) + ":";
   }
-  ~DatabaseIdentity() override { ::unsetenv("PGUSER"); }
+  ~DeriveIdentity() override { ::unsetenv("PGUSER"); }
   std::string here;
 };
 
@@ -48,12 +48,12 @@ TEST(ContainsPassword, FindsEachSecretOfLibpqAndEncodedOnes) {
   }
 }
 
-TEST_F(DatabaseIdentity, IsMachineAndNormalizedPathForFile) {
+TEST_F(DeriveIdentity, IsMachineAndNormalizedPathForFile) {
   EXPECT_EQ(derive_identity("/var/lib/vlp/records.db"), here + "/var/lib/vlp/records.db");
   EXPECT_EQ(derive_identity("/var/lib/../lib/records.db"), here + "/var/lib/records.db");
 }
 
-TEST_F(DatabaseIdentity, DiffersForDifferentServersAndDatabasesOnly) {
+TEST_F(DeriveIdentity, DiffersForDifferentServersAndDatabasesOnly) {
   const auto of = [](const std::string& where) { return derive_identity(where); };
   EXPECT_EQ(of("postgresql://u@db/vlp"), "postgresql://db/vlp");
   EXPECT_EQ(of("postgres://other:secret@db:5432/vlp?connect_timeout=2"), of("postgresql://db/vlp"));
@@ -69,7 +69,7 @@ TEST_F(DatabaseIdentity, DiffersForDifferentServersAndDatabasesOnly) {
 }
 
 /// Two machines that share a folder, each with its own server.
-TEST_F(DatabaseIdentity, IncludesMachineForLocalServer) {
+TEST_F(DeriveIdentity, IncludesMachineForLocalServer) {
   for (const char* where :
        {"postgresql:///vlp", "postgresql://localhost/vlp", "postgresql://127.0.0.1:5544/vlp",
         "postgresql:///vlp?host=/run/postgresql", "postgresql://db/vlp?hostaddr=127.0.0.1"}) {
@@ -78,7 +78,7 @@ TEST_F(DatabaseIdentity, IncludesMachineForLocalServer) {
   EXPECT_THAT(derive_identity("postgresql:///vlp?hostaddr=10.0.0.1"), Not(StartsWith(here)));
 }
 
-TEST_F(DatabaseIdentity, ContainsNoPassword) {
+TEST_F(DeriveIdentity, ContainsNoPassword) {
   for (const char* where : {"postgresql://u:secret@db", "postgresql://u@db/vlp?password=secret"}) {
     EXPECT_THAT(derive_identity(where), Not(HasSubstr("secret")));
   }

@@ -42,7 +42,7 @@ std::vector<std::string> list_wrong_positions(const AdjustmentResult& result) {
   return names;
 }
 
-class RunBundleAdjustmentOutliers : public AdjustmentRoom {
+class AdjustBundleOutliers : public AdjustmentRoom {
  protected:
   /// Returns chi-squared of a lamp's survey in the least-squares solution that uses it.
   double compute_survey_chi_squared(std::size_t lamp) const {
@@ -59,7 +59,7 @@ class RunBundleAdjustmentOutliers : public AdjustmentRoom {
 };
 
 /// The survey of the lamp is as uncertain as its position from the captures.
-TEST_F(RunBundleAdjustmentOutliers, LampIsReportedAsMovedAboveChiSquaredLimit) {
+TEST_F(AdjustBundleOutliers, LampIsReportedAsMovedAboveChiSquaredLimit) {
   constexpr std::size_t lamp = 2;
   input.captures_are_checked = true;
   scale_survey(0.1);
@@ -99,7 +99,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampIsReportedAsMovedAboveChiSquaredLimit) {
 
 /// A noise of 0.03 px moves lamps away from their survey if sigma is 0.005 px, and does not if
 /// sigma increases to the noise.
-TEST_F(RunBundleAdjustmentOutliers, LampsAreNotReportedAsMovedIfNoiseExplainsThem) {
+TEST_F(AdjustBundleOutliers, LampsAreNotReportedAsMovedIfNoiseExplainsThem) {
   scale_survey(0.02);
   measure(0.005, 0.03);
   const Solution expected = solve(1);
@@ -116,7 +116,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsAreNotReportedAsMovedIfNoiseExplainsThe
 
 /// With two wrong lamps among five, the three others agree with the survey. With two among four,
 /// the survey is contradicted, and no lamp is moved.
-TEST_F(RunBundleAdjustmentOutliers, LampsAreReportedAsMovedOnlyIfMostAgreeWithSurvey) {
+TEST_F(AdjustBundleOutliers, LampsAreReportedAsMovedOnlyIfMajorityAgreesWithSurvey) {
   scale_survey(0.3);
   input.captures_are_checked = true;
   input.lamps.lamps[0].position_m = true_lamps_m[0] + Eigen::Vector3d(0.02, -0.01, 0.01);
@@ -143,7 +143,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsAreReportedAsMovedOnlyIfMostAgreeWithSu
 
 /// Lamps that are farther than 8 standard deviations from the robust solution are moved, even half
 /// of them.
-TEST_F(RunBundleAdjustmentOutliers, LampsFarFromRobustFitAreReportedAsMovedWithoutMajority) {
+TEST_F(AdjustBundleOutliers, LampsBeyondEightSdsAreReportedAsMovedEvenIfHalf) {
   scale_survey(0.3);
   for (AdjustmentCapture& capture : input.captures) {
     if (capture.known_position) capture.known_position->sd_m *= 0.1;
@@ -165,7 +165,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsFarFromRobustFitAreReportedAsMovedWitho
 }
 
 /// The robust solution rejects the detections of the lamp instead of its position.
-TEST_F(RunBundleAdjustmentOutliers, DetectionsOfMisplacedExactLampAreRejected) {
+TEST_F(AdjustBundleOutliers, DetectionsOfMisplacedExactLampAreRejected) {
   input.lamps.lamps[1].position_m.x() += 0.2;
   measure(0.05, 0.03);
   const AdjustmentResult found = adjust_bundle(input);
@@ -177,7 +177,7 @@ TEST_F(RunBundleAdjustmentOutliers, DetectionsOfMisplacedExactLampAreRejected) {
 }
 
 /// A position that seems wrong beside a lamp that has moved by 8 cm.
-TEST_F(RunBundleAdjustmentOutliers, KnownPositionIsReinstatedOnceMovedLampIsFound) {
+TEST_F(AdjustBundleOutliers, KnownPositionIsReinstatedOnceMovedLampIsFound) {
   input.captures_are_checked = true;
   measure(0.0005, 0.03);
   input.lamps.lamps[0].position_m.x() += 0.08;
@@ -189,7 +189,7 @@ TEST_F(RunBundleAdjustmentOutliers, KnownPositionIsReinstatedOnceMovedLampIsFoun
 
 /// A wrong position that is stated as very accurate dominates the plain solution, in which the
 /// other positions seem wrong. The robust solution rejects it.
-TEST_F(RunBundleAdjustmentOutliers, WrongAccuratePositionIsRejectedInsteadOfTheOthers) {
+TEST_F(AdjustBundleOutliers, WrongPositionWithSmallSdIsRejectedInsteadOfOthers) {
   Survey survey(0.05);
   survey.five_places(1e-3);
   for (AdjustmentCapture& capture : survey.input.captures) {
@@ -207,7 +207,7 @@ TEST_F(RunBundleAdjustmentOutliers, WrongAccuratePositionIsRejectedInsteadOfTheO
 }
 
 /// Survey with an exact map, whose rotations determine each axis to 0.1 mm.
-TEST_F(RunBundleAdjustmentOutliers, KnownPositionIsWrongBeyondFiveSds) {
+TEST_F(AdjustBundleOutliers, KnownPositionIsOutlierBeyondFiveSds) {
   constexpr double sd_m = 5e-3;
   for (const bool is_checked : {true, false}) {
     for (const auto& [low, high] :
@@ -238,7 +238,7 @@ TEST_F(RunBundleAdjustmentOutliers, KnownPositionIsWrongBeyondFiveSds) {
 }
 
 /// Exact detections but one: the limit is 4.5 given standard deviations.
-TEST_F(RunBundleAdjustmentOutliers, DetectionIsOutlierBeyondFourAndAHalfSigmas) {
+TEST_F(AdjustBundleOutliers, DetectionIsOutlierBeyondFourAndAHalfSigmas) {
   for (const bool is_checked : {true, false}) {
     for (const double sigmas : {4.4, 5.0}) {
       Survey survey(0);
@@ -259,7 +259,7 @@ TEST_F(RunBundleAdjustmentOutliers, DetectionIsOutlierBeyondFourAndAHalfSigmas) 
 
 /// Without sigma, the limit follows from the median of the residuals, which are the noise but for
 /// few degrees of freedom.
-TEST_F(RunBundleAdjustmentOutliers, DetectionIsOutlierBeyondScatterWithoutSigma) {
+TEST_F(AdjustBundleOutliers, OutlierLimitFollowsFromMedianResidualWithoutSigma) {
   constexpr double noise_px = 0.02;
   for (const bool is_checked : {true, false}) {
     for (const double fraction : {0.85, 1.2}) {
@@ -298,7 +298,7 @@ TEST_F(RunBundleAdjustmentOutliers, DetectionIsOutlierBeyondScatterWithoutSigma)
 }
 
 /// A wrong lamp of the map is below the camera, where the lens does not image it.
-TEST_F(RunBundleAdjustmentOutliers, DetectionOfLampBelowCameraIsRejected) {
+TEST_F(AdjustBundleOutliers, DetectionOfLampBelowCameraIsRejected) {
   Survey survey;
   survey.five_places(1e-4);
   survey.input.lamps.lamps.push_back({9, {0.2, 0.3, -1}, {}, {}, {}, 0.002});
@@ -311,7 +311,7 @@ TEST_F(RunBundleAdjustmentOutliers, DetectionOfLampBelowCameraIsRejected) {
   EXPECT_LT(found.residual_px, 1e-6);
 }
 
-TEST_F(RunBundleAdjustmentOutliers, CaptureWithoutInlierCountsAsRejected) {
+TEST_F(AdjustBundleOutliers, CaptureWithoutInlierCountsAsRejected) {
   Survey survey;
   survey.five_places(1e-4);
   std::vector<Detection>& detections = survey.input.captures[17].detections;
@@ -328,7 +328,7 @@ TEST_F(RunBundleAdjustmentOutliers, CaptureWithoutInlierCountsAsRejected) {
 
 /// Tilt of 46 degrees, with an initial tilt that has an error of 1 degree, and an inclined robot.
 /// Detections below the horizon are no lamps.
-TEST_F(RunBundleAdjustmentOutliers, LampsOfStronglyTiltedCameraAreFoundAboveHorizonOnly) {
+TEST_F(AdjustBundleOutliers, DetectionsBelowHorizonOfTiltedCameraAreRejected) {
   Survey survey;
   Calibration& truth = survey.truth.calibration;
   truth.camera = fisheye_camera();
@@ -356,7 +356,7 @@ TEST_F(RunBundleAdjustmentOutliers, LampsOfStronglyTiltedCameraAreFoundAboveHori
 }
 
 /// Without a row time, all pixels are read at the middle of the image.
-TEST_F(RunBundleAdjustmentOutliers, MotionHasNoEffectWithoutRowTime) {
+TEST_F(AdjustBundleOutliers, MotionHasNoEffectWithoutRowTime) {
   Survey survey;
   survey.five_places(1e-4);
   survey.stand({{0.2, -0.1, 0}, 2.0});
@@ -369,7 +369,7 @@ TEST_F(RunBundleAdjustmentOutliers, MotionHasNoEffectWithoutRowTime) {
 }
 
 /// Corrections of a free map neither shift, turn nor scale the lamps in view.
-TEST_F(RunBundleAdjustmentOutliers, CorrectionsOfFreeMapContainNoSimilarity) {
+TEST_F(AdjustBundleOutliers, CorrectionsOfFreeMapNeitherShiftRotateNorScaleIt) {
   measure(0.05, 0.03);
   for (AdjustmentCapture& capture : input.captures) capture.known_position.reset();
   input.map_prior = MapPrior::frame;

@@ -21,7 +21,7 @@
 namespace vlp {
 namespace {
 
-class RunBundleAdjustmentResult : public AdjustmentRoom {
+class AdjustBundleResult : public AdjustmentRoom {
  protected:
   AdjustmentResult adjust(const AdjustmentLimits& limits = {}) const {
     AdjustmentResult found = adjust_bundle(input, limits);
@@ -49,7 +49,7 @@ Eigen::VectorXd stack_parameters(const AdjustmentResult& found) {
   return parameters;
 }
 
-TEST_F(RunBundleAdjustmentResult, EstimatesAndCovarianceMatchDenseSolution) {
+TEST_F(AdjustBundleResult, EstimatesAndCovarianceMatchDenseSolution) {
   measure(0.05, 0.03);
   const Solution expected = solve(1);
   ASSERT_EQ(expected.noise_scale, 1);
@@ -77,7 +77,7 @@ TEST_F(RunBundleAdjustmentResult, EstimatesAndCovarianceMatchDenseSolution) {
   }
 }
 
-TEST_F(RunBundleAdjustmentResult, CountsAndResidualMatchDenseSolution) {
+TEST_F(AdjustBundleResult, CountsAndResidualMatchDenseSolution) {
   measure(0.05, 0.03);
   const Solution expected = solve(1);
   std::vector<Detection>& fifth = input.captures[5].detections;
@@ -96,7 +96,7 @@ TEST_F(RunBundleAdjustmentResult, CountsAndResidualMatchDenseSolution) {
   EXPECT_NEAR(found.lamp_height_m, expected.lamp_height_m, 1e-6);
 }
 
-TEST_F(RunBundleAdjustmentResult, RefinedLampsAndTheirCovarianceEqualEstimates) {
+TEST_F(AdjustBundleResult, RefinedLampsAndTheirCovarianceEqualEstimates) {
   measure(0.05, 0.03);
   const AdjustmentResult found = adjust();
   ASSERT_EQ(found.lamps.size(), 5U);
@@ -123,7 +123,7 @@ TEST_F(RunBundleAdjustmentResult, RefinedLampsAndTheirCovarianceEqualEstimates) 
   EXPECT_THAT(found.notes, testing::SizeIs(1)) << "lamp 16 is in no capture";
 }
 
-TEST_F(RunBundleAdjustmentResult, LampsWithoutDetectionAreNoUnknowns) {
+TEST_F(AdjustBundleResult, LampsWithoutDetectionAreNotEstimated) {
   measure(0.05, 0.03);
   const AdjustmentResult few = adjust();
   for (int i = 0; i < 3000; ++i)
@@ -135,7 +135,7 @@ TEST_F(RunBundleAdjustmentResult, LampsWithoutDetectionAreNoUnknowns) {
   EXPECT_THAT(many.notes, testing::SizeIs(1));
 }
 
-TEST_F(RunBundleAdjustmentResult, KnownPositionsListResidualsOfEachPivotAndPosition) {
+TEST_F(AdjustBundleResult, KnownPositionsListResidualsOfEachPivotAndPosition) {
   measure(0.05, 0.03);
   const Solution expected = solve(1);
   const AdjustmentResult found = adjust();
@@ -155,7 +155,7 @@ TEST_F(RunBundleAdjustmentResult, KnownPositionsListResidualsOfEachPivotAndPosit
 }
 
 /// Errors of the focal lengths for which chi-squared is 1, and 3 % below and above its bound.
-TEST_F(RunBundleAdjustmentResult, LensChiSquaredComparesCorrectionWithItsCovariance) {
+TEST_F(AdjustBundleResult, LensChiSquaredComparesCorrectionWithItsCovariance) {
   measure(0.05, 0.03);
   const double bound = compute_chi_squared_bound(kSigmasOfOneInTenThousand, 3);
   input.captures_are_checked = true;
@@ -176,7 +176,7 @@ TEST_F(RunBundleAdjustmentResult, LensChiSquaredComparesCorrectionWithItsCovaria
 }
 
 /// The captures determine a focal length, but no coefficient that is known to 1e-9.
-TEST_F(RunBundleAdjustmentResult, LensDegreesOfFreedomCountOnlyDeterminedDirections) {
+TEST_F(AdjustBundleResult, LensDegreesOfFreedomCountOnlyDeterminedDirections) {
   measure(0.05, 0.03);
   auto& covariance = input.calibration.intrinsics_report->covariance;
   covariance = MatrixX::Zero(12, 12);
@@ -197,7 +197,7 @@ TEST_F(RunBundleAdjustmentResult, LensDegreesOfFreedomCountOnlyDeterminedDirecti
   EXPECT_EQ(adjust().camera.intrinsics, input.calibration.camera.intrinsics);
 }
 
-TEST_F(RunBundleAdjustmentResult, NoiseScaleAndContradictionMatchResidualsForTooSmallSigma) {
+TEST_F(AdjustBundleResult, NoiseScaleAndContradictionMatchResidualsForTooSmallSigma) {
   measure(0.005, 0.03);
   const Solution expected = solve(1);
   ASSERT_GT(expected.noise_scale, 3);
@@ -218,7 +218,7 @@ TEST_F(RunBundleAdjustmentResult, NoiseScaleAndContradictionMatchResidualsForToo
   }
 }
 
-TEST_F(RunBundleAdjustmentResult, NoiseScaleIsResidualWithoutGivenSigma) {
+TEST_F(AdjustBundleResult, NoiseScaleIsResidualIfSigmaIsNotGiven) {
   measure(1, 0.03);
   const Solution expected = solve(0);
   // One detection without sigma is enough; the others have the sigma of the assumption.
@@ -232,7 +232,7 @@ TEST_F(RunBundleAdjustmentResult, NoiseScaleIsResidualWithoutGivenSigma) {
 }
 
 /// Captures 0 and 7 have given sigmas, which the setting does not change.
-TEST_F(RunBundleAdjustmentResult, EstimatesHaveWeightsInUndistortedImageWithoutSigma) {
+TEST_F(AdjustBundleResult, DetectionsWithoutSigmaAreWeightedInUndistortedImage) {
   measure(1, 0.03);
   const Lens lens(input.calibration.camera.lens_model, input.calibration.camera.intrinsics);
   std::vector<Eigen::Matrix2d> whitening;
@@ -264,7 +264,7 @@ TEST_F(RunBundleAdjustmentResult, EstimatesHaveWeightsInUndistortedImageWithoutS
                          equal.refined_covariance / std::pow(equal.noise_scale, 2), 0.02);
 }
 
-TEST_F(RunBundleAdjustmentResult, LimitsOfZenithAndLeverArmApplyToLargestSd) {
+TEST_F(AdjustBundleResult, SdLimitsOfZenithAndLeverArmApplyToWorstDirection) {
   measure(0.05, 0.03);
   const AdjustmentResult found = adjust();
   ASSERT_TRUE(found.center.lever_arm_m);

@@ -46,7 +46,7 @@ AdjustmentInput make_input_of_two_lamps(const Eigen::Vector2d& distance_px) {
 
 /// One detection in a corner of the map has the id of a lamp beyond the opposite corner. The pose
 /// from all four lamps is turned by half a turn. The pose of the other three lamps is right.
-TEST(RunBundleAdjustmentStart, IsFittedToThreeLampsIfOneOfFourIsMisidentified) {
+TEST(AdjustBundleInitialPoses, FitsPoseToThreeLampsIfOneOfFourIsMisidentified) {
   Survey survey;
   survey.five_places(1e-4);
   survey.input.lamps.lamps.push_back({9, {1.5, 0.9, 1.6}, {}, {}, {}, 0.002});
@@ -64,7 +64,7 @@ TEST(RunBundleAdjustmentStart, IsFittedToThreeLampsIfOneOfFourIsMisidentified) {
 
 /// Map with errors of 5 mm. Only the first captures contain two lamps of equal x and y. Swapped
 /// lamps in opposite corners turn the pose from all lamps of the last capture by half a turn.
-TEST(RunBundleAdjustmentStart, IsFittedToLampsThatAgreeWithinFractionOfTheirDistances) {
+TEST(AdjustBundleInitialPoses, FitsPoseToLampsThatAgreeRelativeToTheirDistances) {
   Survey survey(0.005);
   survey.truth.map.lamps[1].position_m = {0.5, 0.05, 1.7};  // below it, lamp 7 at 1.59 m
   survey.input.lamps = survey.truth.map;
@@ -85,7 +85,7 @@ TEST(RunBundleAdjustmentStart, IsFittedToLampsThatAgreeWithinFractionOfTheirDist
 
 /// Two lamps at a distance of d px determine the height H with the standard deviation H sqrt(2) /
 /// d, if the noise is 1 px. It must be below H.
-TEST(RunBundleAdjustmentStart, NeedsTwoLampsFartherApartThanRootTwoPixels) {
+TEST(AdjustBundleInitialPoses, RejectsCaptureOfTwoLampsCloserThanRootTwoPixels) {
   for (const Eigen::Vector2d& direction : {Eigen::Vector2d(1, 0), Eigen::Vector2d(0, 1)}) {
     AdjustmentInput input = make_input_of_two_lamps(1.3 * direction);
     const AdjustmentResult near = adjust_bundle(input);
@@ -104,7 +104,7 @@ TEST(RunBundleAdjustmentStart, NeedsTwoLampsFartherApartThanRootTwoPixels) {
 }
 
 /// The only capture at the pivot has one lamp.
-TEST(RunBundleAdjustmentStart, PivotWithoutFixHasNoEffect) {
+TEST(AdjustBundleInitialPoses, PivotWithoutFixDoesNotChangeResult) {
   Survey survey;
   survey.five_places(1e-4);
   const AdjustmentResult without = adjust_bundle(survey.input);
@@ -121,7 +121,7 @@ TEST(RunBundleAdjustmentStart, PivotWithoutFixHasNoEffect) {
 }
 
 /// Coordinates of a national grid. The shift is a power of two, and adds no rounding.
-TEST(RunBundleAdjustmentStart, IsExactFarFromOriginOfWorld) {
+TEST(AdjustBundleInitialPoses, PosesAreExactFarFromOriginOfWorld) {
   const Eigen::Vector3d shift_m(4194304, -2097152, 524288);
   Survey survey;
   for (LampMap* const map : {&survey.truth.map, &survey.input.lamps}) {
@@ -148,7 +148,7 @@ TEST(RunBundleAdjustmentStart, IsExactFarFromOriginOfWorld) {
 }
 
 /// The camera is 1.4 m from its axis. Its lever arm is calibrated, and each pivot has few captures.
-TEST(RunBundleAdjustmentStart, UsesCalibratedLeverArm) {
+TEST(AdjustBundleInitialPoses, UsesCalibratedLeverArm) {
   Survey survey;
   survey.lever_arm_m = {1.2, -0.7};
   survey.input.calibration.rotation_center = survey.truth.calibration.rotation_center;
@@ -167,7 +167,7 @@ TEST(RunBundleAdjustmentStart, UsesCalibratedLeverArm) {
 }
 
 /// The lever arm follows from known positions of the axis, without a pivot.
-TEST(RunBundleAdjustmentStart, AxisPositionsDetermineLeverArmButCameraPositionsDoNot) {
+TEST(AdjustBundleInitialPoses, AxisPositionsDetermineLeverArmButCameraPositionsDoNot) {
   for (const MeasuredPoint point : {MeasuredPoint::axis, MeasuredPoint::camera}) {
     Survey survey(0);
     survey.turn({0, 0, 0}, 4, 1e-3, point);
@@ -191,7 +191,7 @@ TEST(RunBundleAdjustmentStart, AxisPositionsDetermineLeverArmButCameraPositionsD
   }
 }
 
-TEST(RunBundleAdjustmentStart, FailsForKnownPositionThatIsNoNumber) {
+TEST(AdjustBundleInitialPoses, FailsForKnownPositionThatIsNan) {
   for (const bool is_checked : {true, false}) {
     Survey survey;
     survey.turn({0, 0, 0}, 2, 1e-3);

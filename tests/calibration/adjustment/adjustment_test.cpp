@@ -100,7 +100,7 @@ TEST(AdjustBundle, RecoversAllLampsExactlyWhenOneIsMoved) {
                                "scale of the map; captures at 3 more known positions")));
 }
 
-TEST(AdjustBundle, OneCaptureOfTwoLampsNeedsSecondHeight) {
+TEST(AdjustBundle, AsksForSecondHeightForOneCaptureOfTwoLamps) {
   Survey survey;
   survey.turn({0, 0, 0}, 1);
   survey.input.captures[0].detections.resize(2);

@@ -24,7 +24,7 @@ struct Case {
   bool refined;
 };
 
-class RunBundleAdjustmentCovariance : public testing::TestWithParam<Case> {};
+class AdjustBundleCovariance : public testing::TestWithParam<Case> {};
 
 /// Calibration and the map that belongs to it, from one survey.
 struct Unit {
@@ -56,7 +56,7 @@ Unit calibrated(Survey& survey, const Case& the, Random& random) {
           map};
 }
 
-TEST_P(RunBundleAdjustmentCovariance, FixCovarianceMatchesFixErrorsAfterAdjustment) {
+TEST_P(AdjustBundleCovariance, FixCovarianceMatchesFixErrorsAfterAdjustment) {
   const Case& the = GetParam();
   constexpr int trials = 200;
   Random random(20 + static_cast<std::uint64_t>(the.places));
@@ -95,7 +95,7 @@ TEST_P(RunBundleAdjustmentCovariance, FixCovarianceMatchesFixErrorsAfterAdjustme
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Adjustment, RunBundleAdjustmentCovariance,
+    Adjustment, AdjustBundleCovariance,
     testing::Values(Case{"GoodMapOnePlace", 1e-4, 1, Case::exact, true},
                     Case{"TapedMapThreePlaces", 2e-3, 3, Case::exact, true},
                     Case{"TapedMapOnePlaceAndLens", 2e-3, 1, Case::boards, true},

@@ -35,7 +35,7 @@ std::ostream& operator<<(std::ostream& out, const PlaceCase& variant) {
   return out << variant.name;
 }
 
-class RunBundleAdjustmentNoise : public testing::TestWithParam<PlaceCase> {};
+class AdjustBundleNoise : public testing::TestWithParam<PlaceCase> {};
 
 /// Returns 30 captures of four lamps each: residuals have few degrees of freedom, and known
 /// positions many.
@@ -74,7 +74,7 @@ Survey make_survey(const PlaceCase& variant, Random& random) {
 
 /// 150 runs determine the rms of 2 x 150 zenith coordinates to 4 %; the noise of one run is
 /// determined to 9 % by 60 degrees of freedom, its mean to 0.7 %.
-TEST_P(RunBundleAdjustmentNoise, NoiseAndZenithSdMatchTruthForAnyKnownPositions) {
+TEST_P(AdjustBundleNoise, NoiseAndZenithSdMatchTruthForAnyKnownPositions) {
   const PlaceCase& variant = GetParam();
   constexpr int runs = 150;
   Random random(61);
@@ -100,7 +100,7 @@ TEST_P(RunBundleAdjustmentNoise, NoiseAndZenithSdMatchTruthForAnyKnownPositions)
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Places, RunBundleAdjustmentNoise,
+    Places, AdjustBundleNoise,
     testing::Values(PlaceCase{"None", 0, false, false, MeasuredPoint::camera, {}},
                     PlaceCase{"Coarse", 0.05, false, false, MeasuredPoint::camera, {}},
                     PlaceCase{"CoarseWithHeight", 0.05, true, false, MeasuredPoint::camera, {}},

@@ -66,9 +66,9 @@ struct Room {
   /// Upper limits of the means.
   Means limits;
 };
-class RunBundleAdjustmentAccuracy : public testing::TestWithParam<Room> {};
+class AdjustBundleAccuracy : public testing::TestWithParam<Room> {};
 
-TEST_P(RunBundleAdjustmentAccuracy, KeepsMeanFixAndMapErrorsBelow150Micrometers) {
+TEST_P(AdjustBundleAccuracy, KeepsMeanFixAndMapErrorsBelow150Micrometers) {
   const Room& the = GetParam();
   const Means found = over_trials(the.map_sd_m, the.places_are_wrong, 10);
   std::printf("%s: fixes %.4f mm, height %.4f mm; map %.4f mm, height %.4f mm, squared %.3f\n",
@@ -85,7 +85,7 @@ TEST_P(RunBundleAdjustmentAccuracy, KeepsMeanFixAndMapErrorsBelow150Micrometers)
 
 // Limits for exact positions with a standard deviation of 0.1 mm, and for errors of this size.
 constexpr Means kRight{6.5e-5, 8e-5, 5e-5, 1.5e-4}, kWrong{1.1e-4, 1e-4, 1.2e-4, 1.5e-4};
-INSTANTIATE_TEST_SUITE_P(Adjustment, RunBundleAdjustmentAccuracy,
+INSTANTIATE_TEST_SUITE_P(Adjustment, AdjustBundleAccuracy,
                          testing::Values(Room{"Taped", 0.002, false, kRight},
                                          Room{"TapedAndPlacesWrong", 0.002, true, kWrong},
                                          Room{"Paced", 0.02, false, kRight},

@@ -60,10 +60,10 @@ std::vector<ReferencePointCapture> make_captures(Station& station, const Capture
   return made;
 }
 
-class EstimateDispersionOffsetUncertainty : public testing::TestWithParam<Captures> {};
+class EstimateDispersionUncertainty : public testing::TestWithParam<Captures> {};
 
 /// 600 draws of two axes determine an RMS to 3 % and the fraction of 5 % to 0.6 %.
-TEST_P(EstimateDispersionOffsetUncertainty, Offset95PercentIntervalCoversErrorAtNominalRate) {
+TEST_P(EstimateDispersionUncertainty, Offset95PercentIntervalCoversErrorAtNominalRate) {
   const Captures& cell = GetParam();
   Station station(0.01);
   const auto exact = make_captures(station, cell);
@@ -122,7 +122,7 @@ TEST_P(EstimateDispersionOffsetUncertainty, Offset95PercentIntervalCoversErrorAt
 
 constexpr DispersionMethod kCamera = DispersionMethod::camera, kPaper = DispersionMethod::chen_guan;
 INSTANTIATE_TEST_SUITE_P(
-    Captures, EstimateDispersionOffsetUncertainty,
+    Captures, EstimateDispersionUncertainty,
     testing::Values(Captures{"FullTurn", kCamera, 16, 0, 1},
                     Captures{"FullTurnNoiseNotStated", kCamera, 16, 0, {}},
                     Captures{"Over135Degrees", kCamera, 10, 0, 1, false, 0, 2.36},

@@ -142,7 +142,7 @@ TEST(EstimateDispersion, ReducesFixCircleToZeroWithInclinationSensor) {
   EXPECT_LT(fit.after.radius, 1e-9);
 }
 
-TEST(EstimateDispersion, StatusNamesTooFewCapturesWrongYawsFarReferenceOrOtherMap) {
+TEST(EstimateDispersion, ReturnsStatusOfEachUnusableSetOfCaptures) {
   Station station(0.01);
   const auto find_status = [&](const std::vector<ReferencePointCapture>& captures,
                                DispersionMethod method = DispersionMethod::camera) {

@@ -191,7 +191,7 @@ TEST(EstimateDispersion, ChenGuanMethodCentersFixesAndReturnsLampDerivatives) {
 
 /// Fixes of two lamps have no residuals, so that only their scatter counts. It includes the
 /// isotropic mean with the weight of three fixes.
-TEST(EstimateDispersion, ChenGuanMethodCovarianceIsThatOfScatterWithoutResiduals) {
+TEST(EstimateDispersion, ChenGuanMethodCovarianceMatchesScatterOfTwoLampFixes) {
   NoisyStation station;
   station.noisy = station.captures_at(0.7, 5, 0.1);
   for (auto& capture : station.noisy) capture.detections.resize(2);
@@ -279,7 +279,7 @@ TEST(DescribeDispersionStatus, DescribesEachStatusDifferently) {
 }
 
 /// Both methods, other focal lengths and other reference points.
-TEST(PredictOffset, MatchesEstimateWithOtherInputs) {
+TEST(PredictOffset, MatchesNewEstimateForChangedLensAndPosition) {
   for (const DispersionMethod method : {DispersionMethod::camera, DispersionMethod::chen_guan}) {
     NoisyStation station;
     station.noisy = method == DispersionMethod::camera

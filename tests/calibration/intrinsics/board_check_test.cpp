@@ -59,7 +59,7 @@ TEST_P(CheckBoardLayout, ReportsMeasuredGapWhenTagSpacingIsWrong) {
   EXPECT_THAT(problem(board, views_.lens), HasSubstr(GetParam() ? "gaps of 0.3 " : "gaps of 1 "));
 }
 
-TEST_P(CheckBoardLayout, ReportsDetectedIdOrderWhenGivenOrderIsWrong) {
+TEST_P(CheckBoardLayout, ReportsTrueIdOrderWhenGivenOneIsWrong) {
   for (const bool column_major : {false, true}) {
     for (const auto from : {BoardCorner::bottom_right, BoardCorner::top_left}) {
       Board board = views_.board;
@@ -72,7 +72,7 @@ TEST_P(CheckBoardLayout, ReportsDetectedIdOrderWhenGivenOrderIsWrong) {
   EXPECT_THAT(problem(board), HasSubstr("cols 6, rows 5"));
 }
 
-TEST_P(CheckBoardLayout, ReportsDetectedIdOrderOfSquareBoardForWrongOrder) {
+TEST_P(CheckBoardLayout, ReportsTrueIdOrderOfSquareBoardWhenGivenOneIsWrong) {
   Board truth = views_.board;
   truth.rows = truth.cols;
   const SyntheticViews views{truth, views_.lens};
@@ -255,7 +255,7 @@ TEST(CheckFlatBoardLayout, SpacingToleranceIsFivePercentOrOnePercentWithLens) {
             "tag_spacing is 0.25, but the images show gaps of 0.4 tags");
 }
 
-TEST(CheckFlatBoardLayout, PitchAllowsForStatedShiftOfEdges) {
+TEST(CheckFlatBoardLayout, PitchIsCorrectedForGivenEdgeDisplacement) {
   // Tags of 20 px with edges moved inwards by 1 px are 18 px wide; the pitch is 28 px.
   const auto views = make_flat_views(small_board(), {{1000, 0.3, 1}, {1000, -2, 1}});
   EXPECT_NEAR(check_board_layout(small_board(), views, {}, 0).pitch.value(), 28 / 18.0, 1e-9);

@@ -99,7 +99,7 @@ TEST(EstimateViewPose, MinimizesWeightedSquaresAndReturnsTheirRms) {
   }
 }
 
-TEST(EstimateViewPose, NeedsFourCornersWithRay) {
+TEST(EstimateViewPose, ReturnsNulloptForFewerThanFourCornersWithRay) {
   const Lens lens = wide_lens();
   const auto all = project_board(lens, {{0.5, -0.3, 0.8}, {-0.05, 0.02, 0.4}});
   ASSERT_EQ(all.size(), 24U);
@@ -137,7 +137,7 @@ IntrinsicsInput make_stereographic_views(double focal_px, int count) {
   return views.input(count, random, 0.01);
 }
 
-TEST(RankInitialFocalLengths, BeginsWithTrueFocalLengthOfSeries) {
+TEST(RankInitialFocalLengths, RanksTrueFocalLengthFirst) {
   // The width of the image times powers of sqrt(2).
   std::vector<double> series;
   for (int k = -5; k <= 6; ++k) series.push_back(800 * std::pow(std::sqrt(2.0), k));

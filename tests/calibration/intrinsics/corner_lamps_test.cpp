@@ -12,7 +12,7 @@ namespace vlp {
 namespace {
 
 /// Points of a board of tags, as in mrcal's files, have the ids of the same corners of tags.
-TEST(MakeCornerLamps, GivesPointsIdsOfTagCorners) {
+TEST(MakeCornerLamps, AssignsIdsOfTagCornersToSamePoints) {
   for (const bool kalibr : {false, true}) {
     const SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
     const BoardLattice lattice(views.board);

@@ -27,7 +27,7 @@ std::vector<CornerError> simulate_errors(const CornerVariance& truth, Random& ra
   return errors;
 }
 
-TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceOfSimulatedCorners) {
+TEST(FitCornerVariance, MatchesTrueVarianceOfSimulatedCorners) {
   Random random(1);
   for (const auto& [rest_px, scale] :
        {std::pair{0.02, 1.2}, {0.0, 1.0}, {0.05, 0.0}, {0.2, 1.0}, {0.005, 2.0}}) {
@@ -40,7 +40,7 @@ TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceOfSimulatedCorners) {
   }
 }
 
-TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceWithOnePercentOutliers) {
+TEST(FitCornerVariance, MatchesTrueVarianceWithOnePercentOutliers) {
   Random random(2);
   const CornerVariance truth{1e-4, 1};
   auto errors = simulate_errors(truth, random);
@@ -51,7 +51,7 @@ TEST(EstimateCornerVarianceComponents, MatchesTrueVarianceWithOnePercentOutliers
   }
 }
 
-TEST(EstimateCornerVarianceComponents, ReturnsExactFloorAndScaleForExactSquares) {
+TEST(FitCornerVariance, ReturnsExactFloorAndScaleForExactSquares) {
   constexpr double floor_px2 = 4e-4, scale2 = 2.25;
   std::vector<CornerError> errors;
   for (const double sd_px : {0.01, 0.02, 0.04, 0.05, 0.08})
@@ -102,7 +102,7 @@ TEST(CornerWeights, KnownCornerSdsReduceProjectionErrorOfSolve) {
 }
 
 /// Some corners have no standard deviation and much larger errors than the others.
-TEST(CornerWeights, SolvedLensHardlyChangesByErroneousCornersWithoutSd) {
+TEST(CornerWeights, CornersWithoutSdHaveAlmostNoEffectOnLens) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(4);
   IntrinsicsInput input = uneven_input(views, random);

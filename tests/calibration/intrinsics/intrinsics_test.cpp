@@ -178,7 +178,7 @@ TEST(SolveFirstStages, ReinstatesViewsThatFitLensWithoutBadViews) {
   }
 }
 
-TEST(SolveIntrinsics, NeedsMoreThanHalfOfViews) {
+TEST(SolveIntrinsics, FailsUnlessMoreThanHalfOfViewsHaveCorners) {
   IntrinsicsInput input = make_exact_views(7);
   for (const std::size_t i : {0U, 3U, 5U}) input.views[i].clear();
   const IntrinsicsSolution four = solve_intrinsics(input);
@@ -212,7 +212,7 @@ IntrinsicsInput make_tilted_views(double tilt_rad) {
   return input;
 }
 
-TEST(SolveIntrinsics, NeedsBoardNormalsFiveDegreesApart) {
+TEST(SolveIntrinsics, FailsUnlessBoardNormalsDifferByFiveDegrees) {
   EXPECT_EQ(solve_intrinsics(make_tilted_views(0.085)).status, IntrinsicsStatus::all_parallel);
   EXPECT_EQ(solve_intrinsics(make_tilted_views(0.095)).status, IntrinsicsStatus::ok);
 }
@@ -228,7 +228,7 @@ TEST(SolveIntrinsics, EstimatesWarpOfExactBoard) {
   EXPECT_LT(solution.rms_px, 1e-5);
 }
 
-TEST(SolveHalfOfViews, FailsForParallelBoardsAndUnseenPoints) {
+TEST(SolveHalfOfViews, ReturnsFailureStatusForParallelBoardsOrUnseenPoints) {
   const IntrinsicsSolution whole = solve_intrinsics(make_tilted_views(0.3));
   ASSERT_TRUE(whole.has_succeeded());
   ASSERT_EQ(whole.views.size(), 6U);

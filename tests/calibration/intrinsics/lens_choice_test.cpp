@@ -149,7 +149,7 @@ TEST(IsFisheyeWorse, ReturnsTrueOnlyForLensThatFisheyeCannotFit) {
   EXPECT_FALSE(is_worse(fisheye_lens(), LensModel::opencv4));
 }
 
-TEST(IsFisheyeWorse, ReturnsFalseBeyond90DegreesOffAxis) {
+TEST(IsFisheyeWorse, ReturnsFalseIfCornersExceed90DegreesOffAxis) {
   Random random(44);
   const InitialSolutions initial(wide_input(false, 24, random, kNoise_px));
   EXPECT_FALSE(is_fisheye_worse(initial, LensModel::opencv8));

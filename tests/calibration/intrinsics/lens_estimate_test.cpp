@@ -103,7 +103,7 @@ TEST(EstimateLens, HoldsOutEveryThirdView) {
   EXPECT_THAT(few.problem, HasSubstr("2 views with the board: "));
 }
 
-TEST(EstimateLens, ReturnsTooFewViewsForChoiceOfModelBelowSix) {
+TEST(EstimateLens, RequiresSixViewsForChoiceOfLensModel) {
   LensViews input = make_views(5);
   input.choose_lens_model = true;
   const LensEstimate result = estimate_lens(input);
@@ -153,7 +153,7 @@ TEST(EstimateLens, WarnsOfViewsInconsistentWithLensOfOthers) {
   EXPECT_THAT(result.warnings, testing::Contains(result.inconsistent_views));
 }
 
-TEST(EstimateLens, AddsErrorOfPrintToUncertainty) {
+TEST(EstimateLens, AddsBoardPrintErrorToUncertainty) {
   LensViews input = make_views(20);
   const LensEstimate exact = estimate_lens(input);
   input.board.print_sd = 0.002;
@@ -188,7 +188,7 @@ LensViews make_wide_views(int count, double reach_deg, LensModel model) {
   return input;
 }
 
-TEST(EstimateLens, NamesSplineGridThatReachesAllBoards) {
+TEST(EstimateLens, RecommendsSplineGridThatReachesAllBoards) {
   const auto narrow =
       lens_model_from_name("LENSMODEL_SPLINED_STEREOGRAPHIC_order=3_Nx=11_Ny=11_fov_x_deg=100");
   ASSERT_TRUE(narrow);
@@ -244,7 +244,7 @@ IntrinsicsInput make_solver_input(const LensEstimate& result, const Board& board
   return input;
 }
 
-TEST(EstimateLens, StatesThatViewsAreParallel) {
+TEST(EstimateLens, ProblemStatesThatViewsAreParallel) {
   LensViews input = make_views(1, 0);
   input.views.resize(8, input.views[0]);
   const LensEstimate result = estimate_lens(input);
@@ -314,7 +314,7 @@ TEST(EstimateLens, ReturnsWrongBoardForSpacingThatOnlyLensContradicts) {
   EXPECT_TRUE(result.solution.has_succeeded());
 }
 
-TEST(EstimateLens, ComparesLensModelsFromFiveViewsOn) {
+TEST(EstimateLens, ComparesLensModelsOnlyForFiveViewsOrMore) {
   for (const int count : {4, 5}) {
     const LensEstimate result = estimate_lens(make_views(count));
     ASSERT_TRUE(result.has_succeeded()) << result.problem;

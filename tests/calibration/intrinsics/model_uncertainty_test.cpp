@@ -53,7 +53,7 @@ class CombineModelFits : public testing::Test {
   }
 };
 
-TEST_F(CombineModelFits, ReturnsDifferenceToOneModel) {
+TEST_F(CombineModelFits, CovarianceIsThatOfDifferenceToOtherModel) {
   const auto found = compute({longer});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->model, LensModel::opencv5);
@@ -119,7 +119,7 @@ LensViews make_weak_views(const Lens& lens, std::uint64_t seed) {
 }
 
 /// Lenses of three models, each calibrated with the other models and with the selected one.
-TEST(EstimateLens, StatedErrorCoversErrorOfWrongModelWithWeakViews) {
+TEST(EstimateLens, ReportedUncertaintyCoversErrorOfWrongModelForFewViews) {
   const std::array lenses{
       Lens(LensModel::opencv4, std::array{420., 421., 402., 297., -0.28, 0.07, 2e-4, 1e-4}),
       Lens(LensModel::fisheye, std::array{420., 421., 402., 297., 0.03, -0.012, 0.004, -0.0006}),

@@ -61,7 +61,7 @@ TEST_P(WriteMrcalCorners, RereadCornersYieldSameLensAsOriginalSolve) {
 }
 
 /// Images of two folders with the same names.
-TEST_P(WriteMrcalCorners, AppendsNumbersToRepeatedImageNames) {
+TEST_P(WriteMrcalCorners, MakesRepeatedImageNamesUniqueByNumbers) {
   constexpr std::size_t count = 8;
   Random random(3);
   const IntrinsicsSolution solution = solve_intrinsics(views.input(count, random, 0.05));

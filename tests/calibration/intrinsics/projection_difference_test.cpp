@@ -146,7 +146,7 @@ double compute_largest_pixel_change(const Eigen::VectorXd& stacked) {
   return std::sqrt(stacked.reshaped(2, stacked.size() / 2).colwise().squaredNorm().maxCoeff());
 }
 
-TEST(EstimateExpectedMaxProjectionDifference, MatchesRandomDrawsForSeveralUnknowns) {
+TEST(PredictMaxDifference, MatchesRandomDrawsForSeveralUnknowns) {
   const Lens lens(LensModel::opencv4, kRadialLens);
   Eigen::VectorXd sds(8);
   sds << 0.5, 0.6, 0.4, 0.3, 2e-3, 2e-3, 4e-4, 5e-4;

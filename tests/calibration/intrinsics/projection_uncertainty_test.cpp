@@ -129,7 +129,7 @@ TEST(FitHeldOutViews, RmsOfHeldOutViewsMatchesCornerNoise) {
   EXPECT_NEAR(held_out.rms_px, 0.05, 0.006);
 }
 
-TEST(MeasureViewCoverage, ReturnsTiltOnlyForSideNearerToCamera) {
+TEST(MeasureViewCoverage, TiltCountsOnlyForSideNearerToCamera) {
   const SyntheticViews views{synthetic_board(false), synthetic_lens()};
   Random random(9);
   const IntrinsicsInput input = views.input(12, random, 0);
@@ -247,7 +247,7 @@ TEST(MeasureViewCoverage, CountsCornersOfSolvedViewsInParts) {
   EXPECT_EQ(coverage.tilt_rad, 0);
 }
 
-TEST(MeasureViewCoverage, TiltsAreLargestOfEachSideAndBetweenBoards) {
+TEST(MeasureViewCoverage, ReturnsLargestTiltTowardsEachSideAndBetweenBoards) {
   const IntrinsicsInput input{
       BoardLattice(synthetic_board(false)), {}, {900, 600}, LensModel::pinhole};
   // A positive rotation about y brings the right side nearer, about x the upper side.
@@ -318,7 +318,7 @@ TEST(FitHeldOutViews, WeightsViewsByCornersAndSkipsViewsWithoutPose) {
 
 /// The shift of the edges, the warp of the board and the curvature of the edges are modeled, so
 /// that exact corners have no residuals.
-TEST(ComputeHeldOutViewResidualRms, VanishesForShiftedEdgesOfWarpedBoard) {
+TEST(ComputeHeldOutRms, VanishesForShiftedEdgesOfWarpedBoard) {
   for (const bool kalibr : {false, true}) {
     SyntheticViews views{synthetic_board(kalibr), synthetic_lens()};
     views.warp_m = {0.002, -0.0015};

@@ -49,7 +49,7 @@ TEST(FitSplinedLens, ReturnsExactControlPointsOfLinearSurface) {
   }
 }
 
-TEST(FitSplinedLens, MatchesRotatedFisheyeInImage) {
+TEST(FitSplinedLens, ProjectsLikeRotatedFisheye) {
   const Lens fisheye(LensModel::fisheye,
                      std::array{290.0, 291.0, 402.0, 297.0, 0.03, -0.012, 0.004, -0.0006});
   const Eigen::Matrix3d fisheye_from_splined =

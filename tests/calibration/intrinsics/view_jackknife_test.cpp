@@ -42,7 +42,7 @@ TEST(JackknifeCovariance, IsInfiniteForSingleView) {
 
 /// Compares with solves without the views of a block, whose poses are then estimated. Blocks of
 /// seven views in three: 3, 2 and 2 views.
-TEST(ComputeLeftOutMeanSquares, MatchesSolvesWithoutBlock) {
+TEST(ComputeLeftOutSquares, MatchesSolvesWithoutBlock) {
   constexpr std::size_t num_views = 7, blocks = 3;
   const SyntheticViews synthetic{synthetic_board(false), synthetic_lens()};
   Random random(22);
@@ -75,7 +75,7 @@ TEST(ComputeLeftOutMeanSquares, MatchesSolvesWithoutBlock) {
   EXPECT_GT(left_out, 1.05 * in_sample);
 }
 
-TEST(ComputeLeftOutMeanSquares, IsInfiniteWithoutRemainingViews) {
+TEST(ComputeLeftOutSquares, IsInfiniteWithoutRemainingViews) {
   const IntrinsicsSolution solution =
       solve_to_minimum(false, LensModel::fisheye, WarpChoice::off, 4);
   ASSERT_TRUE(solution.has_succeeded());

@@ -24,7 +24,7 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-/// Mean height of the lamps above the captures of DetectLampErrorsAtLimits.
+/// Mean height of the lamps above the captures of DetectMapErrorsAtLimits.
 constexpr double kMeanHeight_m = 1.45;
 
 MapError make_moved_lamp(int lamp, const Eigen::Vector3d& offset_mm) {
@@ -92,9 +92,9 @@ TEST(ListUndetectedLamps, ListsLampsInNoFrameInOrderOfMap) {
 
 /// Eight lamps of several heights, and captures without noise of a camera whose calibration
 /// contains its tilt.
-class DetectLampErrorsAtLimits : public testing::Test {
+class DetectMapErrorsAtLimits : public testing::Test {
  protected:
-  DetectLampErrorsAtLimits() {
+  DetectMapErrorsAtLimits() {
     rig.map = make_lamp_map({{-0.8, -0.4, 1.60},
                              {0.8, -0.4, 1.62},
                              {0.7, 0.4, 1.58},
@@ -142,7 +142,7 @@ class DetectLampErrorsAtLimits : public testing::Test {
 };
 
 /// All lamps at one height, far from the origin of the world.
-TEST_F(DetectLampErrorsAtLimits, OffsetsAreExactWithOrWithoutTiltAndInclination) {
+TEST_F(DetectMapErrorsAtLimits, OffsetsAreExactWithOrWithoutTiltAndInclination) {
   origin_m = {12, -7, 2};
   for (Lamp& lamp : rig.map.lamps) {
     lamp.position_m.z() = 1.6;
@@ -175,7 +175,7 @@ TEST_F(DetectLampErrorsAtLimits, OffsetsAreExactWithOrWithoutTiltAndInclination)
 }
 
 /// Robot with the camera turned on it: the inclination is that of the robot.
-TEST_F(DetectLampErrorsAtLimits, InclinationsRotateWithYawOfCameraOnRobot) {
+TEST_F(DetectMapErrorsAtLimits, InclinationsRotateWithYawOfCameraOnRobot) {
   options.yaw_in_robot_rad = 0.8;
   const Inclination of_robot{0.06, -0.04};
   const Eigen::Matrix3d level_from_base =
@@ -205,7 +205,7 @@ TEST_F(DetectLampErrorsAtLimits, InclinationsRotateWithYawOfCameraOnRobot) {
 }
 
 /// Captures with two lamps, lamps that are detected twice, and ids that are not in the map.
-TEST_F(DetectLampErrorsAtLimits, UsesCapturesWithThreeUniqueLampsOfTheMap) {
+TEST_F(DetectMapErrorsAtLimits, UsesCapturesWithThreeUniqueLampsOfTheMap) {
   frames[0].detections.resize(2);
   frames[0].detections.push_back({99, {400, 300}, {}});
   frames[1].detections.resize(3);
@@ -222,7 +222,7 @@ TEST_F(DetectLampErrorsAtLimits, UsesCapturesWithThreeUniqueLampsOfTheMap) {
   EXPECT_THAT(captures, ElementsAre(10, 11, 11, 9, 10, 10, 10, 10));
 }
 
-TEST_F(DetectLampErrorsAtLimits, ReportsFewerThanHalfOfTheLampsAsMoved) {
+TEST_F(DetectMapErrorsAtLimits, ReportsFewerThanHalfOfTheLampsAsMoved) {
   set_survey_sd(1e-4);
   const std::vector<std::size_t> moved{1, 3, 4, 6};
   for (const std::size_t count : {1U, 2U, 3U, 4U}) {
@@ -247,7 +247,7 @@ TEST_F(DetectLampErrorsAtLimits, ReportsFewerThanHalfOfTheLampsAsMoved) {
   }
 }
 
-TEST_F(DetectLampErrorsAtLimits, ReportsNoMovedLampsIfMoreThanEightMoved) {
+TEST_F(DetectMapErrorsAtLimits, ReportsNoMovedLampsIfMoreThanEightMoved) {
   std::vector<Eigen::Vector3d> positions_m;
   for (int i = 0; i < 20; ++i) {
     positions_m.emplace_back(0.4 * (i % 5) - 0.8 + 0.02 * (i % 3), 0.3 * (i / 5) - 0.45, 1.6);
@@ -266,7 +266,7 @@ TEST_F(DetectLampErrorsAtLimits, ReportsNoMovedLampsIfMoreThanEightMoved) {
 }
 
 /// The smallest offset is given in pixels at the mean height of the lamps above the camera.
-TEST_F(DetectLampErrorsAtLimits, OmitsOffsetsBelowSmallestOffsetInPixels) {
+TEST_F(DetectMapErrorsAtLimits, OmitsOffsetsBelowSmallestOffsetInPixels) {
   place(1).head<2>() += Eigen::Vector2d(0.012, -0.016);
   const double offset_px = 0.02 * 521 / kMeanHeight_m;
   options.min_offset_px = 0.98 * offset_px;
@@ -278,9 +278,9 @@ TEST_F(DetectLampErrorsAtLimits, OmitsOffsetsBelowSmallestOffsetInPixels) {
 }
 
 /// Twenty captures with noise in which a lamp is confused with other lights.
-class DetectUnsteadyLamp : public DetectLampErrorsAtLimits {
+class DetectInconsistentLamp : public DetectMapErrorsAtLimits {
  protected:
-  DetectUnsteadyLamp() {
+  DetectInconsistentLamp() {
     take_captures(20);
     options.min_offset_px = 0.25;
     Random random(3);
@@ -299,7 +299,7 @@ class DetectUnsteadyLamp : public DetectLampErrorsAtLimits {
   }
 };
 
-TEST_F(DetectUnsteadyLamp, IsReportedInMoreThanTenPercentOfCaptures) {
+TEST_F(DetectInconsistentLamp, ReportsLampThatContradictsOverTenPercentOfCaptures) {
   confuse(3, 2);
   EXPECT_THAT(detect().errors, IsEmpty()) << "10 %";
   frames[6].detections[3].pixel.x() += 60;
@@ -311,7 +311,7 @@ TEST_F(DetectUnsteadyLamp, IsReportedInMoreThanTenPercentOfCaptures) {
   EXPECT_EQ(found.errors[0].captures, 20);
 }
 
-TEST_F(DetectUnsteadyLamp, IsReportedOnlyWithMostOfTheOutliers) {
+TEST_F(DetectInconsistentLamp, ReportsLampOnlyIfItHasMajorityOfOutliers) {
   confuse(3, 4);
   const std::vector<Frame> before = frames;
   for (const std::size_t others : {3U, 4U}) {
@@ -323,7 +323,7 @@ TEST_F(DetectUnsteadyLamp, IsReportedOnlyWithMostOfTheOutliers) {
 
 /// The median of the outliers has to exceed three standard deviations of the survey, and five times
 /// the smallest offset of a moved lamp.
-TEST_F(DetectUnsteadyLamp, IsReportedIfOutliersExceedSurveyErrorsAndSmallestOffset) {
+TEST_F(DetectInconsistentLamp, ReportsLampIfOutliersExceedSurveyErrorsAndMinOffset) {
   confuse(3, 5);
   // Returns the value from which on the lamp is not reported.
   const auto find_limit = [&](double high, const auto& set_value) {
@@ -344,7 +344,7 @@ TEST_F(DetectUnsteadyLamp, IsReportedIfOutliersExceedSurveyErrorsAndSmallestOffs
 
 /// A parallelogram with two opposite corners swapped is the parallelogram with the other two
 /// swapped, turned by half a turn.
-TEST_F(DetectLampErrorsAtLimits, SwappedLampsAreNotNamedIfAnotherPairFitsAsWell) {
+TEST_F(DetectMapErrorsAtLimits, SwappedLampsAreNotNamedIfAnotherPairFitsAsWell) {
   for (const bool is_parallelogram : {true, false}) {
     rig.map = make_lamp_map({{-0.8, -0.4, 1.6},
                              {is_parallelogram ? 0.6 : 0.5, -0.4, 1.6},

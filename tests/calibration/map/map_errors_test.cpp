@@ -246,7 +246,7 @@ TEST_F(DetectMapErrors, ReportsLampWhoseDetectionsContradictOtherLamps) {
   EXPECT_EQ(errors()[0].contradicting_captures, 6);
 }
 
-TEST_F(DetectMapErrors, ReportsContradictedMapOnlyWhenLampIdsMatch) {
+TEST_F(DetectMapErrors, ReportsMapOfOtherRoomOnlyIfItHasDetectedIds) {
   for (Lamp& lamp : map.lamps) {
     lamp.position_m.head<2>() = Eigen::Vector2d(random.uniform(-1, 1), random.uniform(-1, 1));
   }

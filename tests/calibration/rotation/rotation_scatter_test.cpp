@@ -35,11 +35,11 @@ struct RotationCase {
   Method method = axis;
 };
 
-class RotationFitScatter : public testing::TestWithParam<RotationCase> {};
+class FitRotationAxisScatter : public testing::TestWithParam<RotationCase> {};
 
 /// 200 draws determine a standard deviation to 5 %, and that of a lever arm to 6 %, because the
 /// error of the scale of the map is common to both axes. Residuals are those of the pixels.
-TEST_P(RotationFitScatter, ErrorsMatchReportedCovarianceAndInliersAreKept) {
+TEST_P(FitRotationAxisScatter, ErrorsMatchReportedCovarianceAndInliersAreKept) {
   constexpr int draws = 200;
   const auto& [name, scene, map_sd_m, noise_is_stated, noise_px, method] = GetParam();
   const auto frames = scene.frames(noise_px);
@@ -124,7 +124,7 @@ RotationScene level_scene(int captures) {
 const std::vector<double> kOneHeight{0}, kTwoHeights{0, 0.3};
 const Eigen::Vector2d kNoArm_m(0, 0), kArm_m(0.25, -0.2);
 INSTANTIATE_TEST_SUITE_P(
-    Rotation, RotationFitScatter,
+    Rotation, FitRotationAxisScatter,
     testing::Values(
         RotationCase{"NoLeverArm", make_scene(kNoArm_m, kOneHeight)},
         RotationCase{"ArcOfThreeRadians", with_arc(make_scene(kNoArm_m, kOneHeight), 3)},
@@ -146,7 +146,7 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& one) { return one.param.name; });
 
 /// A detection with an error of 6 px, 20 standard deviations, is rejected, and only this one.
-TEST(RotationFit, EachMethodRejectsOnlyTheOutlierAmongFewCaptures) {
+TEST(RotationFit, BothMethodsRejectOnlyOutlierAmongFewCaptures) {
   constexpr int runs = 25;
   for (const Method method : {&mean_circle, &axis}) {
     RotationScene scene = level_scene(method == &mean_circle ? 12 : 4);

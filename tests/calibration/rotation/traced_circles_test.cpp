@@ -119,7 +119,7 @@ TEST(FitCircleCenters, ReturnsMeanSpreadResidualAndCovarianceOfCircles) {
 }
 
 /// Circles through three points have no residuals, and no covariance.
-TEST(FitCircleCenters, HasNoCovarianceForThreeCaptures) {
+TEST(FitCircleCenters, ReturnsNoCovarianceForThreeCaptures) {
   TracedCaptures traced(2);
   const auto angles = make_equal_angles(3);
   for (const double angle : angles) traced.add_capture(angle);
@@ -147,7 +147,7 @@ bool is_determined(const std::vector<double>& angles, double sigma, double axis_
 
 /// Four points at angles of +-a about two opposite directions. Across them, the information is
 /// 4 sin^2 a and the contribution of the noise s^2 / R^2 4 cos^2 a.
-TEST(FitCircleCenters, CenterIsDeterminedUpToQuarterNoiseAcrossOppositeYaws) {
+TEST(FitCircleCenters, CenterIsUndeterminedIfNoiseExceedsQuarterOfInformation) {
   for (const double direction : {0.0, 0.8}) {
     for (const double a : {0.2, 0.5}) {
       std::vector<double> angles;

@@ -40,7 +40,7 @@ TEST(EstimateTiltFromLamps, ReturnsExactTiltForKnownAndUnknownMotion) {
 }
 
 /// A skipped capture does not shift the motions of the captures after it.
-TEST(EstimateTiltFromLamps, AppliesMotionOfEachCaptureWhenAnotherHasFewLamps) {
+TEST(EstimateTiltFromLamps, AssignsMotionsCorrectlyAfterSkippedCapture) {
   Random random(4);
   const BodyRig rig = make_tilted_body();
   MovingCaptures captures = make_moving_captures(rig, 12, 2, random, 1e-3);

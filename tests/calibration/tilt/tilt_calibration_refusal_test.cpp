@@ -49,7 +49,7 @@ class EstimateTiltFromLampsFailure : public testing::Test {
   }
 };
 
-TEST_F(EstimateTiltFromLampsFailure, CapturesNeedThreeLampsOfTheMap) {
+TEST_F(EstimateTiltFromLampsFailure, FailsForCapturesOfFewerThanThreeLampsOfMap) {
   expect("there is none", {});
   expect("there is one", noisy_drive(1, 0.1));
   expect("there is none", noisy_drive(20, 0.1, 2));
@@ -62,7 +62,7 @@ TEST_F(EstimateTiltFromLampsFailure, CapturesNeedThreeLampsOfTheMap) {
 }
 
 /// The limits are 10 degrees, and 0.16 m at lamps 1.6 m above the camera.
-TEST_F(EstimateTiltFromLampsFailure, PosesHaveToDiffer) {
+TEST_F(EstimateTiltFromLampsFailure, FailsUnlessPosesDifferByTenPercentOfHeightOrTenDegrees) {
   rig = make_tilted_rig(0, 0);
   expect("have one position and yaw", around(0.155, 9.8));
   expect("", around(0.165, 9.8));
@@ -79,7 +79,7 @@ TEST_F(EstimateTiltFromLampsFailure, PosesHaveToDiffer) {
 
 /// Residuals: two per detection. Unknowns: four per capture, two of the zenith, and three per
 /// detected lamp minus five that captures cannot determine.
-TEST_F(EstimateTiltFromLampsFailure, RefinedMapNeedsRedundancy) {
+TEST_F(EstimateTiltFromLampsFailure, FailsWithoutRedundancyWhenRefiningMap) {
   expect("too few lamps", noisy_drive(3, 1e-3, 3), true);
   expect("too few lamps", noisy_drive(2, 1e-3, 4), true);
   expect("", noisy_drive(3, 1e-3, 4), true);
@@ -87,7 +87,7 @@ TEST_F(EstimateTiltFromLampsFailure, RefinedMapNeedsRedundancy) {
 }
 
 /// Lamp 3 is in two captures, then in one.
-TEST_F(EstimateTiltFromLampsFailure, LargestStandardDeviationsAreLimited) {
+TEST_F(EstimateTiltFromLampsFailure, FailsIfTiltOrLampSdExceedsLimitOfOptions) {
   auto frames = noisy_drive(12, 0.5);
   const auto limited = [&](double factor) {
     const TiltCalibration found = estimate_tilt_from_lamps(frames, rig.map, rig.calibration.camera);

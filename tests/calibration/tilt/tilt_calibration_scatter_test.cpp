@@ -26,10 +26,10 @@ struct TiltCase {
   bool refine_map = false;
 };
 
-class EstimateTiltScatter : public testing::TestWithParam<TiltCase> {};
+class EstimateTiltFromLampsScatter : public testing::TestWithParam<TiltCase> {};
 
 /// 400 draws determine a standard deviation to 4 %.
-TEST_P(EstimateTiltScatter, ZenithErrorsMatchReportedCovariance) {
+TEST_P(EstimateTiltFromLampsScatter, ZenithErrorsMatchReportedCovariance) {
   constexpr int draws = 400;
   const TiltCase& drive = GetParam();
   Random random(26);
@@ -82,7 +82,7 @@ TEST_P(EstimateTiltScatter, ZenithErrorsMatchReportedCovariance) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Tilt, EstimateTiltScatter,
+    Tilt, EstimateTiltFromLampsScatter,
     testing::Values(TiltCase{"ExactMap", 12}, TiltCase{"ExactMapNoiseNotStated", 12, 0, false},
                     TiltCase{"ThreeLamps", 30, 0, true, 3, 3},
                     TiltCase{"RefinedMap", 16, 0, true, 3, 8, true},

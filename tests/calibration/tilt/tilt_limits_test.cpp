@@ -106,7 +106,7 @@ TEST(EstimateTiltFromLamps, KeepsAllDetectionsOfTiltedCameraDespiteSmallStatedNo
 
 /// An exact lamp with a wrong position stays in use, and detections without sigma_px have equal
 /// weights in the undistorted image. Other settings of the adjustment give another zenith.
-TEST(EstimateTiltFromLamps, UsesCheckedCapturesAndWeightsOfUndistortedImage) {
+TEST(EstimateTiltFromLamps, AdjustsCheckedCapturesWeightedInUndistortedImage) {
   Random random(77);
   SyntheticRig rig = make_tilted_rig(0.01, 1);
   auto frames = with_noise(drive(rig, 8, random, 0.2), random);

@@ -236,7 +236,7 @@ TEST(SquareCorners, ReturnsNoCornersIfSquaresAreCovered) {
   EXPECT_TRUE(BoardDetector(board).detect_board(image).points.empty());
 }
 
-TEST(OtherBoardKinds, MarkerDictionaryIsNamed) {
+TEST(OtherBoardKinds, NamesMarkerDictionaryOfImage) {
   Board charuco = squares(BoardKind::charuco, 7, 5);
   const cv::Mat markers = drawn_by_opencv(charuco);
   charuco.family = "DICT_4X4_50";

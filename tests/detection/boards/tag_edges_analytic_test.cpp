@@ -154,7 +154,7 @@ TEST(RefineTags, MeasuresCurvatureOfEachEdge) {
 }
 
 // Pixels extend to 2.5 px from the adjacent edges.
-TEST(RefineTags, ReachIsExtentOfPixelsRelativeToFittedEdge) {
+TEST(RefineTags, ReachIsFractionOfEdgeLengthWithFittedPixels) {
   for (const double outwards_px : {-1.4, 0.0, 1.4}) {
     const AnalyticTag tag = make_square(40.2, 40);
     auto tags = make_detections({tag}, outwards_px);
@@ -289,7 +289,7 @@ TEST(RefineTags, UsesOnlyPixelsInsideImage) {
   }
 }
 
-TEST(RefineTags, KeepsCornersOfTagThatIsNotInImage) {
+TEST(RefineTags, KeepsCornersOfTagMissingInImage) {
   const AnalyticTag tag = make_square(20.2, 40), missing = make_square(80.3, 30);
   auto tags = make_detections({tag, missing});
   const auto costs = refine_tags(tags, render_tags({tag}, {.gamma = 2}),

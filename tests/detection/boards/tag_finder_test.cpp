@@ -26,7 +26,7 @@ TEST(MakeArucoMarker, ReturnsBitsRowByRowAndThrowsForMissingMarkers) {
   }
 }
 
-TEST(MakeArucoMarker, MessageListsMarkersOrDictionaries) {
+TEST(MakeArucoMarker, ErrorListsValidMarkersOrDictionaries) {
   const auto reject = [](const std::string& dictionary, int id) {
     return rejection_message<std::invalid_argument>([&] { make_aruco_marker(dictionary, id); });
   };

@@ -103,7 +103,7 @@ TEST(QuantityComparison, VerdictRequiresWholeIntervalOnOneSideOfZero) {
   EXPECT_EQ(comparison.comparison_verdict(), "worse");
 }
 
-TEST(CompareFixErrors, CountsPairsAndFixesMissingInEitherRun) {
+TEST(CompareFixErrors, CountsPairsAndFixesMissingInEitherFile) {
   Pairs all = pairs(10, 1e-2);
   all.errors.erase(all.errors.begin(), all.errors.begin() + 3);
   all.other_errors.erase(all.other_errors.begin() + 9);
@@ -154,7 +154,7 @@ TEST(CompareFixErrors, ReturnsWorseForHeightYawOrStandardDeviations) {
   EXPECT_THAT(compare_changed(0, 0, 10), ElementsAre(same, same, same, worse, better, worse));
 }
 
-TEST(CompareFixErrors, CountsCapturesThatEscapeComparison) {
+TEST(CompareFixErrors, CountsUnpairedCaptures) {
   Pairs all = pairs(10, 0);
   const auto unpaired = [&] {
     return compare_fix_errors(all.fixes, all.errors, all.others, all.other_errors, 1).unpaired;

@@ -82,7 +82,7 @@ TEST(DescribeSystematicErrors, NamesShiftedRowsOfPairsAtOnePosition) {
   EXPECT_THAT(found, ElementsAre(HasSubstr("those of the previous row")));
 }
 
-TEST(DescribeSystematicErrors, NamesTurnMirrorAndScale) {
+TEST(DescribeSystematicErrors, NamesRotationMirroringAndScale) {
   EXPECT_THAT(describe([](TruthRow& row) { row.xy_m *= -1; }),
               ElementsAre(testing::ContainsRegex("turned by -?180 degrees:")));
   EXPECT_THAT(describe([](TruthRow& row) { std::swap(row.xy_m.x(), row.xy_m.y()); }),
@@ -91,7 +91,7 @@ TEST(DescribeSystematicErrors, NamesTurnMirrorAndScale) {
               ElementsAre(testing::ContainsRegex("multiplied by 3:")));
 }
 
-TEST(DescribeSystematicErrors, ReturnsNoneForFixesAtOnePlace) {
+TEST(DescribeSystematicErrors, ReturnsNoneForFixesAtOnePosition) {
   FileRows<FixRow> fixes{"fixes.csv", {}};
   FileRows<TruthRow> truth{"truth.csv", {}};
   for (int i = 0; i < 12; ++i) {

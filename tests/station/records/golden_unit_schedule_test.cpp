@@ -192,9 +192,9 @@ TEST_F(DescribeGoldenProblem, ReportsUnmeasuredGoldenUnitWhenItsRunIsVoided) {
 }
 
 /// The station in datasets/station, with a golden unit.
-class ComputeMeasurementSettingsDigest : public testing::Test {
+class HashSettings : public testing::Test {
  protected:
-  ComputeMeasurementSettingsDigest() {
+  HashSettings() {
     for (const char* name : {"station.yaml", "camera_type.yaml", "board.yaml", "lamps.yaml"}) {
       fs::copy_file(fs::path(VLP_SOURCE_DIR) / "datasets/station" / name, folder / name);
     }
@@ -223,7 +223,7 @@ class ComputeMeasurementSettingsDigest : public testing::Test {
   TemporaryFolder folder;
 };
 
-TEST_F(ComputeMeasurementSettingsDigest, ChangesWithSettingsThatAffectMeasurements) {
+TEST_F(HashSettings, ChangesWithSettingsThatAffectMeasurements) {
   std::set<std::string> digests{digest()};
   const auto is_new = [&](const char* file, const char* from, const char* to) {
     EXPECT_TRUE(digests.insert(digest_with(file, from, to)).second) << from << " -> " << to;
@@ -252,7 +252,7 @@ TEST_F(ComputeMeasurementSettingsDigest, ChangesWithSettingsThatAffectMeasuremen
   is_new("golden.yaml", "403, 296", "403, 297");
 }
 
-TEST_F(ComputeMeasurementSettingsDigest, IsUnchangedByCommentsFileNamesAndOtherSettings) {
+TEST_F(HashSettings, IsUnchangedByCommentsFileNamesAndOtherSettings) {
   const std::string before = digest();
   const std::string config_sha256 = read_station_config(folder / "station.yaml").sha256;
   const auto is_same = [&](const char* file, const std::string& from, const std::string& to) {

@@ -198,7 +198,7 @@ TEST(DescribeUtcProblem, ReturnsEmptyTextOnlyForExistingDaysAndTimes) {
   }
 }
 
-TEST(Records, CheckDatabaseWritableThrowsWhenUpdateFails) {
+TEST(Records, CheckWritableThrowsWhenUpdateFails) {
   const TemporaryFolder folder;
   const std::string file = (folder / "records.db").string();
   { const Records made(file); }

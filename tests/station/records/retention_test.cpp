@@ -56,7 +56,7 @@ class RetentionTest : public testing::Test {
   StationConfig config{};
 };
 
-TEST_F(RetentionTest, FindExpiredRunFoldersReturnsFoldersOlderThanRetention) {
+TEST_F(RetentionTest, ListExpiredFoldersReturnsFoldersOlderThanRetention) {
   keep(kOld, "a.b", "2020-01-01T01:00:00Z");
   const std::string now = make_run_id(), resumed = "20200101T000000Z-fedcba9876543210";
   keep(now, "a.b", get_current_utc());
@@ -84,7 +84,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersReturnsFoldersOlderThanRetention) {
 }
 
 /// Stations can share folders and records.
-TEST_F(RetentionTest, FindExpiredRunFoldersIgnoresOtherStationsAndSymbolicLinks) {
+TEST_F(RetentionTest, ListExpiredFoldersIgnoresOtherStationsAndSymbolicLinks) {
   const std::string other = "20200101T000000Z-fedcba9876543210";
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   keep(other, "a", "2020-01-01T01:00:00Z", "attic");
@@ -97,7 +97,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersIgnoresOtherStationsAndSymbolicLinks)
   EXPECT_THAT(found.folders_without_record, IsEmpty());
 }
 
-TEST_F(RetentionTest, DeleteExpiredRunFolderKeepsTargetsOfSymbolicLinks) {
+TEST_F(RetentionTest, DeleteExpiredKeepsTargetsOfSymbolicLinks) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path images = with_file("captures/a." + kOld), elsewhere = with_file("elsewhere");
   fs::create_directory_symlink(elsewhere, images / "link");
@@ -118,7 +118,7 @@ TEST_F(RetentionTest, DeleteExpiredRunFolderKeepsTargetsOfSymbolicLinks) {
 }
 
 /// The golden unit's calibration can be among the results of the run that measured it.
-TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedByStation) {
+TEST_F(RetentionTest, ListExpiredFoldersExcludesFoldersUsedByStation) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld), images = with_file("captures/a." + kOld);
   config.inputs = {folder.file("station.yaml", ""),
@@ -136,7 +136,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedByStation) {
   EXPECT_THAT(list_expired_folders(config, records).folders_in_use, ElementsAre(images));
 }
 
-TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedThroughSymbolicLinks) {
+TEST_F(RetentionTest, ListExpiredFoldersExcludesFoldersUsedBySymbolicLink) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   const fs::path results = with_file("results/a/" + kOld);
   const auto expect_in_use = [&](const std::string& why) {
@@ -159,7 +159,7 @@ TEST_F(RetentionTest, FindExpiredRunFoldersExcludesFoldersUsedThroughSymbolicLin
   expect_in_use("a script of the hook");
 }
 
-TEST_F(RetentionTest, DeleteExpiredRunFolderThrowsWhenCameraFolderBecameSymbolicLink) {
+TEST_F(RetentionTest, DeleteExpiredThrowsWhenCameraFolderBecameSymbolicLink) {
   keep(kOld, "a", "2020-01-01T01:00:00Z");
   with_file("results/a/" + kOld);
   const fs::path kept = with_file("elsewhere/" + kOld);
@@ -173,7 +173,7 @@ TEST_F(RetentionTest, DeleteExpiredRunFolderThrowsWhenCameraFolderBecameSymbolic
   EXPECT_TRUE(fs::exists(kept / "check/0.png"));
 }
 
-TEST_F(RetentionTest, CheckClockThrowsWhenNewestRunIsOverYearBeforeClock) {
+TEST_F(RetentionTest, CheckClockThrowsForYearLongGapUntilRunsSpanWeek) {
   const auto refusal = [&] { return rejection_message([&] { check_clock(config, records); }); };
   EXPECT_EQ(refusal(), "") << "no run";
   keep(kOld, "a", "2020-01-01T01:00:00Z");

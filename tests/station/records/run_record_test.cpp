@@ -43,7 +43,7 @@ TEST(MakeRunId, SortsByTimeWithinSecond) {
   EXPECT_TRUE(std::ranges::is_sorted(runs)) << testing::PrintToString(runs);
 }
 
-TEST(EscapeRunTexts, KeepsLineBreaksOnlyInCausesAndCalibration) {
+TEST(EscapeRun, KeepsLineBreaksOnlyInCausesAndCalibration) {
   RunRecord run;
   run.operator_name = "J\xf6rg\n";
   run.causes = "first\nsecond\n";

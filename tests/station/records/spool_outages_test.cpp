@@ -33,7 +33,7 @@ using testing::Not;
 using testing::SizeIs;
 using testing::StartsWith;
 
-TEST(Spool, DeliverGivesUpOnLockedDatabaseWithin15Seconds) {
+TEST(Spool, DeliverWaitingReturnsWithin15SecondsForLockedDatabase) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   { const Records made(where); }
@@ -209,7 +209,7 @@ TEST(Spool, StateDistinguishesServerRefusalFromUnreachableServer) {
 }
 
 /// Operators need not understand SQL.
-TEST(Spool, NoticeAndStateForOperatorContainNoSql) {
+TEST(Spool, MessagesForOperatorContainNoSql) {
   if (!PostgresServer::installed()) GTEST_SKIP() << "PostgreSQL is not installed";
   const TemporaryFolder folder;
   const PostgresServer server("right");

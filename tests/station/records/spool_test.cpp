@@ -77,7 +77,7 @@ TEST(Spool, DeliversStoredRunsWhenRecordsBecomeReachable) {
   EXPECT_EQ(later.find_other_user("digest-2-7", "camera-1"), std::nullopt);
 }
 
-TEST(Spool, FindGoldenRunUsingImageReturnsOnlyJudgedGoldenRuns) {
+TEST(Spool, FindGoldenUserReturnsOnlyJudgedGoldenRuns) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);
@@ -283,7 +283,7 @@ TEST(Spool, KeepsDifferentRunWithSameIdWaiting) {
 }
 
 /// A missing file can be on a share that is not mounted.
-TEST(Spool, CreatesDatabaseOnlyInCheckRunsCanBeStored) {
+TEST(Spool, CreatesDatabaseOnlyInCheckCanStore) {
   const TemporaryFolder folder;
   const std::string where = (folder / "records.db").string();
   Spool spool(folder / "spool", where);

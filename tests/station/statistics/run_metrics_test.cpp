@@ -40,7 +40,7 @@ class RunMetrics : public testing::Test {
   Records records{(folder / "records.db").string()};
 };
 
-TEST_F(RunMetrics, LoadMetricOfJudgedRunsExcludesInvalidRunsUnlessRequested) {
+TEST_F(RunMetrics, ExtractTrendValuesExcludesInvalidRunsUnlessRequested) {
   EXPECT_THAT(extract_trend_values(judged()), ElementsAre(0.1, 2, 0.3));
   RunFilter two, invalid;
   two.last = 2;
@@ -73,7 +73,7 @@ TEST_F(CheckOneStation, ThrowsForTwoStations) {
   EXPECT_THROW(check_one_station(points), std::invalid_argument);
 }
 
-TEST_F(RunMetrics, SelectValuesOfStudyUnitsReturnsRequestedOrRepeatedlyMeasuredUnits) {
+TEST_F(RunMetrics, SelectStudyValuesReturnsRequestedOrRepeatedUnits) {
   EXPECT_THAT(select_study_values(judged(), {}),
               AllOf(SizeIs(2), testing::Each(Field(&StudyValue::unit, "a"))));
   EXPECT_THAT(select_study_values(judged(), {"b"}), ElementsAre(Field(&StudyValue::unit, "b")));
@@ -96,7 +96,7 @@ TEST(RequireRunMetricKind, ThrowsNamingKnownMetrics) {
 }
 
 /// sample() has the same images in each run.
-TEST_F(RunMetrics, CheckRunsShareNoImagesThrowsForSameImages) {
+TEST_F(RunMetrics, CheckNoSharedImagesThrowsForSameImages) {
   const auto points = judged();
   const auto values = select_study_values(points, {});
   ASSERT_THAT(values, SizeIs(2));

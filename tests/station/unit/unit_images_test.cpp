@@ -53,7 +53,7 @@ TEST_F(UnitImages, UsesDuplicateImageWhenFirstIsRemoved) {
   EXPECT_EQ(refusal("a.png"), "is the same image as b.png");
 }
 
-TEST_F(UnitImages, OverwrittenImageReplacesOldImageAndDiscardsStepResult) {
+TEST_F(UnitImages, OverwrittenImageReplacesOldOneAndDiscardsStepResult) {
   add_image("a.png", true);
   unit.solve_completed(false);
   ASSERT_TRUE(boards().result);  // a problem: one view makes no lens

@@ -55,7 +55,7 @@ TEST_F(WatchedRunTest, WritesNoFrameWhenFolderBecameSymbolicLink) {
   EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
 }
 
-TEST_F(WatchedRunTest, DeleteRejectedImageFileKeepsFileBehindLaterSymbolicLink) {
+TEST_F(WatchedRunTest, DeleteRejectedKeepsFileBehindLaterSymbolicLink) {
   WatchedRun run(unit, spool);
   for (const char* name : {"captures/0001/boards/a.png", "elsewhere/a.png"}) folder.file(name, "a");
   replace_by_link("captures/0001/boards");
@@ -64,7 +64,7 @@ TEST_F(WatchedRunTest, DeleteRejectedImageFileKeepsFileBehindLaterSymbolicLink) 
   EXPECT_TRUE(fs::exists(folder / "elsewhere/a.png"));
 }
 
-TEST_F(WatchedRunTest, RenameFinishedRunFolderThrowsWhenFolderWasReplaced) {
+TEST_F(WatchedRunTest, RenameFinishedThrowsWhenFolderWasReplaced) {
   {
     const WatchedRun run(unit, spool);
     replace_by_link("captures/0001");
