@@ -31,7 +31,8 @@ class SplineSurface {
 
   const SplineGrid& spline_grid() const { return grid_; }
 
-  /// Half extent of the surface along x and y. Beyond it the lens is not defined.
+  /// Half extent of the surface along x and y of the stereographic plane, in focal lengths. Beyond
+  /// it the lens is not defined.
   const Eigen::Vector2d& spline_half_extent() const { return reach_; }
   /// Returns true if the surface is defined at `u`.
   bool is_defined_at(const Eigen::Vector2d& u) const {

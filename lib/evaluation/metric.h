@@ -9,7 +9,7 @@
 
 namespace vlp {
 
-/// Origin of a metric.
+/// Calibration step or comparison that measures a metric.
 enum class MetricSource {
   /// Metrics of the station alone: blur, differences from the nominal lens of the camera type, and
   /// errors at the known points.

@@ -17,8 +17,8 @@ namespace vlp {
 
 /// Cramer-Rao lower bound of a camera that may move and be tilted, predicted from the pixel noise.
 struct BodyPoseBound {
-  /// Covariances of (X, Y, Z, yaw): `noise` for known motion, roll and pitch; `motion` is the
-  /// increase due to unknown motion; `roll_pitch` the increase due to unknown roll and pitch.
+  /// Terms of the covariance of (X, Y, Z, yaw), in m and rad: `noise` for known motion, roll and
+  /// pitch, the increase due to unknown motion, and the further one due to unknown roll and pitch.
   Matrix4 noise, motion, roll_pitch;
   /// Exact observations of the lamps, and the fix from these and the prior.
   FrameObservations frame;

@@ -16,7 +16,8 @@ namespace vlp {
 /// Maximum number of observations in a frame.
 inline constexpr std::size_t kMaxSightings = 256;
 
-/// Observation of a lamp of the map by a body (pose_estimation.h).
+/// Observation of a lamp of the map by the camera, in the frame of its base ("body" in
+/// pose_estimation.h).
 struct LampObservation {
   /// Position P of the lamp in the world, m.
   Eigen::Vector3d lamp_m;

@@ -17,7 +17,7 @@ struct Rectangle {
   double value;
 };
 
-/// Lines of a pattern across one axis, ascending, with a table for a quick search.
+/// Ascending coordinates, along one axis, of the edges in a pattern, with a table for the search.
 class EdgeCoordinates {
  public:
   EdgeCoordinates() = default;

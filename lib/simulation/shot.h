@@ -12,8 +12,8 @@
 namespace vlp {
 
 /// Exposure times of the lines of a sensor. Time 0 is the middle of the middle line's exposure. An
-/// exposure is divided into `count` equal parts; `index` is the part that sample_begin_s()
-/// and sample_end_s() describe.
+/// exposure is divided into `count` equal time samples. sample_begin_s(), sample_end_s() and
+/// part_middle_s() are the begin, end and middle of sample `index`.
 struct Shutter {
   double row_time_s, exposure_s;
   int lines;
@@ -22,7 +22,7 @@ struct Shutter {
   /// Returns the time of the middle of a line's exposure, s, relative to that of the middle line.
   /// `line` counts from 0 and may be fractional or outside the image.
   double line_center_s(double line) const { return (line - (lines - 1) / 2.0) * row_time_s; }
-  /// Returns the begin of part `index` of a line's exposure, s, on the same time scale.
+  /// Returns the begin of time sample `index` of a line's exposure, s, on the same time scale.
   double sample_begin_s(int line) const {
     return line_center_s(line) + (double(index) / count - 0.5) * exposure_s;
   }

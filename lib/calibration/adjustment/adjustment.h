@@ -38,9 +38,9 @@
 ///   - positions of the camera or of the axis with their standard deviation
 namespace vlp {
 
-/// Measured position of the camera or of the rotation axis (`measured_point`), in the world frame.
-/// `xy_m` is horizontal, in m. `z_m` is the height of the camera; std::nullopt if it was not
-/// measured.
+/// Measured position in the world frame, m. `xy_m` is the horizontal position of the camera or of
+/// the rotation axis (`measured_point`). `z_m` is the height of the camera in both cases;
+/// std::nullopt if it was not measured.
 struct KnownPosition {
   MeasuredPoint measured_point;
   Eigen::Vector2d xy_m;

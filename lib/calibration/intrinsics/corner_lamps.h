@@ -16,7 +16,7 @@ namespace vlp {
 
 /// Corners of a board as lamps at known positions, for a position fix of each view.
 struct CornerLamps {
-  /// All corners of the board, below the camera (LampMap::lamps_below_camera). World: x right and y
+  /// Map of all corners as lamps below the camera (LampMap::lamps_below_camera). World: x right, y
   /// up on the board as printed, z towards the viewer, origin at the bottom left corner. Ids: 4 tag
   /// + corner, with corner 0 to 3 as in BoardTag::corners_m; on boards of squares the index of
   /// list_inner_corners_m().

@@ -17,8 +17,8 @@ namespace vlp {
 /// Lens model with its fit to the corners of a solution, compared with the other models.
 struct LensCandidate {
   LensModel model;
-  /// Geometric mean, over the views, of the RMS residual per axis of a held-out view, px
-  /// (compute_left_out_squares_px2()). Infinity if no lens of the model fits.
+  /// RMS residual per axis of a view to which the lens was not fitted, px, as the geometric mean
+  /// over the views (compute_left_out_squares_px2()). Infinity if no lens of the model fits.
   double rms_px = std::numeric_limits<double>::infinity();
   /// `rms_px` relative to the smallest one of all candidates, minus 1. The model is rejected if
   /// this exceeds `max_excess`. It may describe the lens up to `max_plausible_excess`.

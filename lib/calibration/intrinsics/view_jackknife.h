@@ -16,7 +16,7 @@ struct ViewEquations {
   struct View {
     Eigen::MatrixXd normal;
     Eigen::VectorXd gradient;
-    /// Sum and number of the squared residuals, px^2.
+    /// Sum of the squared residuals of the view, px^2, and their number.
     double squares, count;
   };
 

@@ -14,7 +14,7 @@ namespace vlp {
 /// Position fix of a camera that rotates in place.
 struct RotationFix {
   Pose pose;
-  /// Mean height of the detected lamps above the camera, m. Only lamps of the map count.
+  /// Mean height above the camera of the detected lamps that are in the map, m.
   double height_m;
   /// Index of the pivot, at which the rotation axis stays at one position.
   std::size_t pivot;

@@ -16,8 +16,8 @@ namespace vlp {
 /// Width and height of a tile, in pixels. Tiles at the right and bottom border may be smaller.
 inline constexpr int kTile_px = 64;
 
-/// Number for each tile of an image, the tiles being kTile_px wide and high. As a mask, nonzero
-/// selects a tile.
+/// Mask of the tiles of an image, which are kTile_px wide and high: a tile is selected if its value
+/// is not zero.
 struct TileMask {
   int columns = 0, rows = 0;
   std::vector<std::uint8_t> values;  ///< row by row

@@ -16,8 +16,8 @@ struct LampInPlane {
   double height_beyond_first_m, center_sd_m;
 };
 
-/// Radius of a lamp in the level plane at height 1 and in the map, m. `height_beyond_first_m` as in
-/// LampInPlane.
+/// Radius of a lamp, measured in the level plane at height 1 (dimensionless) and given in the map
+/// (m). `height_beyond_first_m` as in LampInPlane.
 struct LampRadius {
   double radius_in_plane, radius_m, height_beyond_first_m;
 };

@@ -23,7 +23,7 @@ namespace vlp {
 /// Returns the standard deviation per axis, sqrt(trace(C) / 2), in the unit of the covariance C.
 double compute_center_sd(const Matrix2& covariance);
 
-/// Returns the standard deviation, at least kMinSigma_px; std::nullopt if it exceeds kMaxSigma_px.
+/// Returns max(sigma_px, kMinSigma_px); std::nullopt if sigma_px exceeds kMaxSigma_px.
 std::optional<double> limit_center_sd(double sigma_px);
 
 /// Adds an independent error of the center to Light::sigma_px, up to kMaxSigma_px.

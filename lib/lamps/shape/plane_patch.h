@@ -21,7 +21,7 @@ class PlanePatch {
   static constexpr int kMaxDegree = 7, kTerms = (kMaxDegree + 1) * (kMaxDegree + 2) / 2;
 
  public:
-  /// Point of the plane, and its derivative with respect to (column, line).
+  /// Point in the plane of LightShape, and its derivative with respect to the pixel (column, line).
   struct Point {
     Eigen::Vector2d at;
     Matrix2 d_at_d_pixel;

@@ -41,7 +41,8 @@ std::optional<MeasuredLight> fit_rectangular_light(const ImageView& lines, const
                                                    const LightShape& shape,
                                                    const std::vector<Eigen::Vector2d>& sizes_m);
 
-/// Returns the pixels inside a convex polygon, (column, row), on each line of an image of `size`.
+/// Returns one run of pixels for each image row that a convex polygon crosses: the pixels inside
+/// Corners are (column, row). Runs of fewer than two pixels are omitted.
 std::vector<PixelRun> list_chords_in_polygon(const std::vector<Eigen::Vector2d>& polygon,
                                              const ImageSize& size);
 

@@ -18,7 +18,8 @@ struct Oval {
   Eigen::Vector2d oval;
   Matrix2 covariance;
 
-  /// Returns the matrix that maps the outline to the unit circle, to first order.
+  /// Returns the matrix that maps the outline, relative to its center and in radii, to the unit
+  /// circle, to first order in the ovality.
   Matrix2 unit_from_oval() const {
     return Matrix2{{1 - oval[0], -oval[1]}, {-oval[1], 1 + oval[0]}};
   }

@@ -15,7 +15,8 @@ namespace vlp {
 /// line nor control the terminal.
 void print_line(const std::string& text);
 
-/// Runs of a station, or of records alone.
+/// Runs on which a command of vlp-station works: those of a station with its spool, or those of a
+/// database of records without a station (`station` is then std::nullopt).
 struct KnownRuns {
   std::optional<StationConfig> station;
   Spool runs;

@@ -10,8 +10,8 @@ namespace vlp {
 
 /// Options for measuring a unit, a shift of units, or the golden unit.
 struct StationRunOptions {
-  /// Path of the file station.yaml, and id of the camera of the unit. If `camera_id` is empty, a
-  /// shift of several units is measured.
+  /// Path of the file station.yaml, and id of the camera to be measured. If `camera_id` is empty,
+  /// the ids are scanned one after another (measure_scanned_units()).
   std::string station, camera_id;
   /// Name of the operator, and of the work shift; requested at the beginning of a shift if empty.
   std::string operator_name, shift;

@@ -14,7 +14,7 @@ namespace vlp {
 /// Returns the images of all steps with the reasons of rejected ones.
 std::vector<RunRecord::Image> list_run_images(const Unit& unit);
 
-/// Makes the record of a unit's run that ends now, under the run's name `run`.
+/// Makes the record of a unit's run with the id `run`. The current time is the end of the run.
 RunRecord make_unit_record(const Unit& unit, const std::string& run, const ProgramVersion& program);
 
 /// Makes the verdict of a run INVALID because its images are those of an earlier judged run of the
