@@ -423,6 +423,11 @@ std::vector<LampCause> rank_lamp_causes(std::span<const StepCaptures> steps, con
   return causes;
 }
 
+bool is_contradiction_explained(const std::vector<LampCause>& ranked) {
+  constexpr double min_explained = 0.9;
+  return !ranked.empty() && ranked.back().explained >= min_explained;
+}
+
 std::vector<std::string> list_map_contradictions(std::span<const Frame> frames, const LampMap& map,
                                                  const Calibration& calibration) {
   std::vector<std::string> faults;

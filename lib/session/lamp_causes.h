@@ -73,6 +73,10 @@ std::vector<LampCause> rank_lamp_causes(std::span<const StepCaptures> steps, con
                                         const Calibration& calibration,
                                         const CauseOptions& options = {});
 
+/// Returns true if ranked causes remove nine tenths of the contradiction. Otherwise single captures
+/// with errors may be the cause.
+bool is_contradiction_explained(const std::vector<LampCause>& ranked);
+
 /// Describes a map whose lamps are swapped or mirrored, a map of another room, and a lamp that is
 /// inconsistent (calibration/map/map_errors.h), one line each. Requires three captures.
 std::vector<std::string> list_map_contradictions(std::span<const Frame> frames, const LampMap& map,

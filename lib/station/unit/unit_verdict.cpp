@@ -320,9 +320,8 @@ std::vector<Cause> list_lamp_faults(const Unit& unit, const std::vector<CheckedM
       });
   if (is_tilted) return causes;
   // Single captures with errors can be the effect of another cause, or the cause itself.
-  constexpr double min_explained = 0.9;
   std::vector<LampCause> ranked = rank_lamp_causes(steps, lamps, *known);
-  if (ranked.empty() || ranked.back().explained < min_explained) {
+  if (!is_contradiction_explained(ranked)) {
     std::string outliers = describe_check_outliers(unit, *known);
     if (!outliers.empty()) causes.push_back({std::move(outliers)});
   }

@@ -67,28 +67,28 @@ std::vector<Cause> list_station_causes(const Unit& unit, const Calibration& cali
     frames.insert(frames.end(), step.frames.begin(), step.frames.end());
   std::vector<Cause> causes;
   if (!row_time_error.empty()) causes.push_back({row_time_error, false});
-  std::vector<std::string> faults = list_map_contradictions(frames, config.lamps, calibration);
-  if (has_failed) {
-    // If all gates pass, they decide whether all lamps must be detected.
-    std::ranges::move(list_missing_lamps(frames, config.lamps), std::back_inserter(faults));
-  }
-  for (const std::string& fault : faults) causes.push_back({fault, true});
-  if (!faults.empty()) return causes;
-  const StepCaptures& check = steps.back();
-  std::string outliers = describe_wrong_positions(
-      locate_known_points(config, calibration, check.frames, check.positions).input);
-  if (!outliers.empty()) {
-    causes.push_back({std::move(outliers), false});
-    return causes;
-  }
+  for (const std::string& fault : list_map_contradictions(frames, config.lamps, calibration))
+    causes.push_back({fault, true});
+  if (!causes.empty()) return causes;
   // Independent of the gates for lamps: this camera is known.
   const CauseOptions options{.camera_is_known = true, .min_lamp_offset_px = 0.6};
-  for (LampCause& cause : rank_lamp_causes(steps, config.lamps, calibration, options)) {
-    if (has_failed || cause.kind == LampCauseKind::moved_lamp) {
-      causes.push_back({std::move(cause.text), cause.kind != LampCauseKind::other_camera &&
-                                                   cause.kind != LampCauseKind::other_lens});
-    }
+  const auto ranked = rank_lamp_causes(steps, config.lamps, calibration, options);
+  if (!is_contradiction_explained(ranked)) {
+    const StepCaptures& check = steps.back();
+    std::string outliers = describe_wrong_positions(
+        locate_known_points(config, calibration, check.frames, check.positions).input);
+    if (!outliers.empty()) causes.push_back({std::move(outliers), false});
   }
+  for (const LampCause& cause : ranked) {
+    const bool is_station_fault =
+        cause.kind != LampCauseKind::other_camera && cause.kind != LampCauseKind::other_lens;
+    if (has_failed || cause.kind == LampCauseKind::moved_lamp)
+      causes.push_back({cause.text, is_station_fault});
+  }
+  // If all gates pass, they decide whether all lamps must be detected.
+  if (!has_failed) return causes;
+  for (const std::string& fault : list_missing_lamps(frames, config.lamps))
+    causes.push_back({fault, true});
   return causes;
 }
 
