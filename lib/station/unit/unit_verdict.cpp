@@ -138,14 +138,15 @@ bool is_clearly_missed(const CheckedMetric& metric, const Unit& unit,
          sigmas * find_metric_value(measured, accuracy->uncertainty).value_or(0);
 }
 
-/// Returns the problems of a step and its failed gates: properties of the camera that are measured
-/// well enough, then the station, then the camera.
+/// Returns failed gates of a step and its problems: properties of the camera that are measured well
+/// enough, also if captures do not fit because of them, then problems and gates of the station,
+/// then those of the camera.
 std::vector<Cause> list_step_causes(const Unit& unit, StationStep step,
                                     const std::vector<CheckedMetric>& metrics) {
-  std::vector<Cause> causes = list_step_problems(unit, step);
   const UnitStep& state = unit.step_state(step);
-  if (!is_result_valid(state)) return causes;
+  if (!state.result) return list_step_problems(unit, step);
   const std::vector<Metric>& measured = state.result->metrics;
+  std::vector<Cause> causes;
   std::set<std::string> listed;
   const auto append_failures = [&](bool of_camera, const auto& is_selected) {
     append_causes(causes, describe_failures(metrics, of_camera, [&](const CheckedMetric& metric) {
@@ -156,6 +157,8 @@ std::vector<Cause> list_step_causes(const Unit& unit, StationStep step,
   };
   append_failures(
       true, [&](const CheckedMetric& metric) { return is_clearly_missed(metric, unit, measured); });
+  append_causes(causes, list_step_problems(unit, step));
+  if (!state.result->has_succeeded()) return causes;
   const auto is_any = [](const CheckedMetric&) { return true; };
   append_failures(false, is_any);
   append_failures(true, is_any);
