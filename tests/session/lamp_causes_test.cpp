@@ -87,7 +87,7 @@ TEST_F(LampCauses, AreEmptyForConsistentCaptures) {
 TEST_F(LampCauses, AreEmptyForNoiseOfTwiceTheStatedDeviation) {
   const std::vector<StepCaptures> exact = steps;
   std::mt19937 random(11);
-  constexpr int draws = 100;
+  constexpr int draws = 20;
   for (int draw = 0; draw < draws; ++draw) {
     steps = exact;
     for (StepCaptures& step : steps) {
